@@ -101,12 +101,10 @@ class Corners(GaitFunction):
 
     @property
     def length(self) -> float:
-        """Length of the whole closed path [rad]."""
         return float(self._along[-1]) / fraction(self.symmetry)
 
     @property
     def shape_speed(self) -> float:
-        """Shape speed [rad per radian of phase]."""
         return self.length / (2 * np.pi)
 
     @property
@@ -130,14 +128,7 @@ class Corners(GaitFunction):
             take_images(self.symmetry, rates, image, derivative=1),
         )
 
-    def angles(self, t: np.ndarray) -> np.ndarray:
-        return self(t)[0]
-
-    def rates(self, t: np.ndarray) -> np.ndarray:
-        return self(t)[1]
-
     def mapped(self, matrix: np.ndarray) -> Corners:
-        """The polygon with corners multiplied by a matrix ``(m, n_joint)``."""
         return Corners(matrix @ self.corners, self.symmetry)
 
     def grown(self, factor: float) -> Corners:

@@ -18,7 +18,8 @@ DELTA_START = 0.01
 
 
 class GaitFunction:
-    """Base of gaits: ``gait(t)`` is joint angles and rates ``(n_joint, n_time)`` at phases t."""
+    """Base of gaits: ``gait(t)`` is joint angles and rates per period ``(n_joint, n_time)`` at
+    phases t. One defines that call, or `angles` and `rates`."""
 
     n_joint: Any
     is_series = False  # a sum of functions of the phase
@@ -28,12 +29,14 @@ class GaitFunction:
     joint_map: JointMap | None = None
     rest: np.ndarray | float = 0.0  # part of the angles that scaling leaves as it is
 
+    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.angles(t), self.rates(t)
+
     def angles(self, t: np.ndarray) -> np.ndarray:
-        raise NotImplementedError
+        return self(t)[0]
 
     def rates(self, t: np.ndarray) -> np.ndarray:
-        """Joint rates per period."""
-        raise NotImplementedError
+        return self(t)[1]
 
     def mapped(self, matrix: np.ndarray) -> Any:
         """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
@@ -45,12 +48,11 @@ class GaitFunction:
 
     @property
     def length(self) -> float:
-        """Length of the closed path [rad], the mean shape speed per period."""
+        """Length of the closed path [rad]."""
         return float(np.linalg.norm(np.diff(self.angles(_DENSE)), axis=0).sum())
 
     @property
     def motor_gait(self) -> Any:
-        """The gait of the motors."""
         return self
 
     def scaled(self, factor: float) -> Any:
@@ -59,7 +61,6 @@ class GaitFunction:
 
     @property
     def mirrored(self) -> Any:
-        """The mirror image: all angles negated."""
         return self.scaled(-1.0)
 
     def grown(self, factor: float) -> Any:
@@ -93,9 +94,6 @@ class GaitFunction:
         gait = copy.copy(self)
         object.__setattr__(gait, "coordinate", coordinate)
         return gait
-
-    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return self.angles(t), self.rates(t)
 
     def __str__(self) -> str:
         return "\n".join(self.lines())

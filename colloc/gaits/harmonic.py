@@ -62,7 +62,7 @@ class Fourier(GaitFunction):
 
     @classmethod
     def from_table(cls, table: np.ndarray, *more: Any) -> Any:
-        """The series of coefficients (mean, cos 1, sin 1, cos 2, ...), a row a joint."""
+        """The series of a `table`."""
         return cls(table[:, 0], table[:, 1::2], table[:, 2::2], *more)
 
     @property
@@ -98,12 +98,6 @@ class Fourier(GaitFunction):
         both = terms @ np.concatenate([np.cos(now), np.sin(now)])
         return self.mean[:, None] + both[: self.n_joint], both[self.n_joint :]
 
-    def angles(self, t: np.ndarray) -> np.ndarray:
-        return self(t)[0]
-
-    def rates(self, t: np.ndarray) -> np.ndarray:
-        return self(t)[1]
-
     def lines(self) -> list[str]:
         lines = []
         for j, row in enumerate(self.table):
@@ -116,17 +110,15 @@ class Fourier(GaitFunction):
         return [*lines, *self.pointing]
 
     def mapped(self, matrix: np.ndarray) -> Fourier:
-        """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
-        return Fourier(matrix @ self.mean, matrix @ self.cos, matrix @ self.sin)
+        return Fourier(*(matrix @ part for part in (self.mean, self.cos, self.sin)))
 
     def grown(self, factor: float) -> Fourier:
         return Fourier(self.mean, factor * self.cos, factor * self.sin)
 
     def resize(self, n_harmonic: int) -> Fourier:
         """The gait with harmonics added (zero) or cut."""
-        keep = min(n_harmonic, self.n_harmonic)
-        cos, sin = np.zeros((2, self.n_joint, n_harmonic))
-        cos[:, :keep], sin[:, :keep] = self.cos[:, :keep], self.sin[:, :keep]
+        zero = ((0, 0), (0, max(0, n_harmonic - self.n_harmonic)))
+        cos, sin = (np.pad(part[:, :n_harmonic], zero) for part in (self.cos, self.sin))
         return Fourier(self.mean, cos, sin)
 
 

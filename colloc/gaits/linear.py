@@ -54,15 +54,13 @@ class Combination(GaitFunction):
 
     @property
     def mean(self) -> np.ndarray:
-        """Mean angles ``(n_joint,)``."""
         return self.angles(self.basis.instants).mean(axis=1)
 
     @property
     def shape_speed(self) -> float:
         """Root-mean-square shape speed [rad per radian of phase]."""
-        return float(
-            np.sqrt((self.rates(self.basis.instants) ** 2).sum(axis=0).mean()) / (2 * np.pi)
-        )
+        squares = (self.rates(self.basis.instants) ** 2).sum(axis=0)
+        return float(np.sqrt(squares.mean()) / (2 * np.pi))
 
     def angles(self, t: np.ndarray) -> np.ndarray:
         return self.table @ self.basis.functions(np.asarray(t, dtype=float)) + self.rest
@@ -95,7 +93,6 @@ class Combination(GaitFunction):
         return [f"φ: {self.basis.describe()}", *formulas, *self.pointing]
 
     def mapped(self, matrix: np.ndarray) -> Any:
-        """The Fourier series of the gait with shapes multiplied by a matrix ``(m, n_joint)``."""
         return self.basis.series(_SERIES).through(self).mapped(matrix)
 
     def scaled(self, factor: float) -> Combination:
@@ -163,7 +160,6 @@ class LinearClass:
         return None
 
     def motor_gait(self, gait: Any) -> Any:
-        """The gait of the motors, of a member."""
         return gait
 
     @property
@@ -209,7 +205,6 @@ class LinearClass:
 
     # from parameters to gaits
     def size(self, n_joint: int) -> int:
-        """Number of parameters."""
         return self._basis(n_joint).shape[1]
 
     def offset(self, n_joint: int) -> np.ndarray:
@@ -218,7 +213,6 @@ class LinearClass:
         return np.zeros((n_joint, 1)) if joint_map is None else joint_map.offset
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Any:
-        """The gait of a parameter vector."""
         return Combination(self, (self._basis(n_joint) @ parameters).reshape(n_joint, -1))
 
     def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
@@ -276,15 +270,13 @@ class LinearClass:
     # where searches begin
     @property
     def start_class(self) -> Any:
-        """The class that starts of a search are drawn from."""
         return self.series(_START_SERIES) if self.relative_delta else self
 
     def sample_dimension(self, n_joint: int) -> int:
-        """Dimension of the unit cube that starts are drawn from."""
         return self.size(n_joint)
 
     def sample(self, unit: np.ndarray, n_joint: int) -> Any:
-        """The gait of a point of the unit cube, up to its size."""
+        """The gait of a point of the unit cube ``(sample_dimension,)``, up to its size."""
         return self.member((2 * unit - 1) / self._sizes(n_joint), n_joint)
 
     def perturb(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:

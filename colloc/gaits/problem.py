@@ -11,13 +11,13 @@ import numpy as np
 
 from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
-from colloc.gaits.guesses import check_guess, default_guess
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.regime import LEVEL, Free, Regime, regime_of
+from colloc.gaits.starts import check_guess, default_guess
 from colloc.gaits.symmetry import ANTIPODAL, NONE, check_symmetric, fraction
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain, formulations
@@ -62,7 +62,7 @@ class Problem:
         itself gives to files.
     guess : Fourier, Combination or Corners, optional
         An admissible gait of any class to start from. By default a travelling wave
-        (`colloc.gaits.guesses`).
+        (`colloc.gaits.starts`).
     body : Chain or ModalBody
         Or any other `colloc.mechanics.bodies.Body`.
     friction : Friction

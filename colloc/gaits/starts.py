@@ -1,4 +1,8 @@
-"""Initial gaits of a search: random ones, or a gait of another class or chain.
+"""Gaits to start from: a travelling wave, random ones, or a gait of another class or chain.
+
+The wave is ``q_j(t) = a sin(2 pi t - 2 pi w (s_j - 1/2))``, joint j at s_j along the body, tail at
+0 and head at 1; w > 0 travels towards the head. It has both symmetries about the middle of a body
+whose lengths read the same from both ends.
 
 Admissible shapes stay so when all angles shrink together. So a gait is sampled as a direction in
 the space of parameters times a fraction of the largest admissible amplitude. Start number k of a
@@ -7,16 +11,32 @@ seed does not depend on the number of starts.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.guesses import largest_factor, largest_share
-from colloc.gaits.limits import Limit
-from colloc.gaits.problem import Problem
+from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.limits import Limit, under_one_limit
+from colloc.gaits.symmetry import symmetric_samples
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.contact import crossing_depth, link_width
 from colloc.system.errors import ProblemError
 
+WAVES = -1.0
+"""Waves along the body: towards the tail, which carries a body with mu_t > mu_f head first."""
+_SHARE, _LARGEST, _MOVING = 0.6, 1.5, 1.05
+"""Amplitude: a share of the largest admissible one, and at most so much [rad], or so many times the
+least that moves enough."""
+_PHASES, _CHECKED = np.linspace(0.0, 1.0, 201), np.arange(2000) / 2000
+SAFE = 1 - 1e-3
+"""Shapes as large as may be are scaled by this, to be clearly admissible."""
+_BISECTIONS = 21  # to a thousandth of the margin above
+_SLACK = 1e-6  # depth of a crossing that a certificate allows
+_AT_THE_BOUND = 1e-2
+"""Sampling cuts the corners of an optimum on the lower bound of the shape speed: it is still a good
+guess for a richer class."""
+_MOVES = 1e-3  # shape speed, of a wave's, below which a class has nothing of the wave
 LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
 SAMPLERS = (LATIN_HYPERCUBE, PERTURBED)
 BLOCK = 25
@@ -24,7 +44,7 @@ BLOCK = 25
 LARGEST_SEED = 2**63 - 1
 """Files keep seeds and numbers of starts in so many bits."""
 _FRACTIONS = (0.2, 0.95)  # of the largest admissible amplitude
-_PHASES = np.arange(200) / 200
+_EVENLY = np.arange(200) / 200
 _ATTEMPTS = 200
 _CLEARLY_MOVING = 1.5  # shape speed, of the smallest
 _SPREAD = 0.3  # standard deviation of perturbed coefficients [rad]
@@ -40,21 +60,146 @@ other gaits, and leaves it (six harmonics from the best of five: 0.4013, from 10
 delta 0.3998)."""
 
 
-def largest_amplitude(problem: Problem, gait: AnyGait) -> float:
-    """The largest factor by which a gait's angles can be multiplied and stay admissible; inf for
-    the straight body."""
-    angles = gait.angles(_PHASES)
+def largest_factor(
+    body: Body, joint_limit: Limit, angles: np.ndarray, rest: np.ndarray | float = 0.0
+) -> float:
+    """The largest factor by which shapes ``(n_joint, n)``, less those at rest, can be multiplied
+    and stay admissible; inf for straight ones."""
+    angles = angles - rest
+    stretched, joint_limit = under_one_limit(angles, joint_limit)
+    peak = body.bounded_angles.largest(stretched).max()
+    if peak == 0:
+        return np.inf
+
+    def crosses(factor: float) -> bool:
+        return bool(crossing_depth(body, factor * angles + rest).any())
+
+    low, high = 0.0, joint_limit / peak
+    if not crosses(high):
+        return high * SAFE
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if crosses(middle) else (middle, high)
+    return low * SAFE
+
+
+def travelling_wave(
+    body: Body, joint_limit: Limit, waves: float = WAVES, least: float = 0.0
+) -> Fourier:
+    """A wave along a body. If its shape speed were below `least` it is larger, and each joint bends
+    in proportion to its own limit."""
+    cos, sin = body.wave(waves)
+    unit = Fourier(np.zeros(body.n_joint), cos[:, None], sin[:, None])
+    angles = unit.angles(_PHASES)
+    wave = unit.grown(min(_SHARE * largest_factor(body, joint_limit, angles), _LARGEST))
+    if wave.shape_speed >= least:
+        return wave
+    stretched = np.abs(under_one_limit(angles, joint_limit)[0]).max(axis=1)
+    proportions = np.abs(angles).max(axis=1) / np.maximum(stretched, np.finfo(float).tiny)
+    each = unit.mapped(np.diag(proportions))
+    largest = largest_factor(body, joint_limit, each.angles(_PHASES))
+    return each.grown(min(largest, _MOVING * least / each.shape_speed))
+
+
+def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
+    """Largest ratio of a gait's motor speeds to their limits [rad per period]; 0 without limits."""
+    if not speeds:
+        return 0.0
+    fastest = np.abs(gait.motor_gait.rates(_PHASES)).max(axis=1)
+    return float((fastest / np.array(speeds)).max())
+
+
+def initial_member(gait_class: Any, wave: Fourier) -> Any:
+    """The gait that stands for a wave in a class: itself, or the nearest member as fast, or if
+    there is none all its functions at once."""
+    if gait_class.relative_delta or not gait_class.free or isinstance(gait_class, Harmonic):
+        return wave
+    member = gait_class.through(wave)
+    if member.shape_speed <= _MOVES * wave.shape_speed:
+        member = gait_class.member(np.ones(gait_class.size(wave.n_joint)), wave.n_joint)
+    return member.scaled(wave.shape_speed / member.shape_speed)
+
+
+def checked_member(gait_class: Any, gait: Any) -> tuple[Any, float]:
+    """The gait of a class that a guess stands for, a path itself, and its shape speed [rad per
+    radian of phase]."""
+    if gait_class.free and not gait_class.relative_delta:
+        member = gait_class.member(gait_class.parameters(gait_class.through(gait)), gait.n_joint)
+        return member, member.shape_speed
+    points = symmetric_samples(gait, gait_class.symmetry)
+    length = np.linalg.norm(np.diff(points), axis=0).sum()
+    return gait, float(length / (2 * np.pi * gait_class.fraction))
+
+
+def default_guess(
+    body: Body,
+    gait_class: Any,
+    joint_limit: Limit,
+    speeds: tuple[float, ...],
+    smallest_shape_speed: float,
+) -> Any:
+    """A wave in a class, no joint of it faster than allowed. `ProblemError` if it hardly moves."""
+    wave = travelling_wave(body, joint_limit, least=smallest_shape_speed)
+    gait = initial_member(gait_class, wave)
+    if gait.joint_map is not None:
+        most = largest_factor(body, joint_limit, gait.angles(_PHASES), gait.rest)
+        gait = gait.scaled(min(1.0, most))
+    if (share := largest_share(gait, speeds)) > 1:
+        gait = gait.scaled(1 / share)
+    _, rms = checked_member(gait_class, gait)
+    if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
+        raise ProblemError(
+            f"with {'speed_limit' if share > 1 else 'joint_limit'} the usual first gait has a "
+            f"root-mean-square shape speed of {rms:.2g}, less than smallest_shape_speed = "
+            f"{smallest_shape_speed:g}: make that smaller, or give a guess."
+        )
+    return gait
+
+
+def check_guess(
+    body: Body, gait_class: Any, guess: Any, joint_limit: Limit, smallest_shape_speed: float
+) -> None:
+    """Raise a `ProblemError` for a gait of another body, at rest, or inadmissible."""
+    if guess.n_joint != body.n_joint:
+        raise ProblemError(
+            f"guess has {guess.n_joint} {body.defaults.coordinate}s but the body has "
+            f"{body.n_joint}."
+        )
+    member, rms = checked_member(gait_class, guess)
+    if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
+        raise ProblemError(
+            f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
+            f"{smallest_shape_speed:g}); does it have the symmetry {gait_class.symmetry!r} of its "
+            f"class?"
+        )
+    angles, bounded = member.angles(_CHECKED), body.bounded_angles
+    stretched, limit = under_one_limit(angles, joint_limit)
+    largest, depth, what = bounded.largest(stretched).max(), crossing_depth(body, angles), ""
+    if largest > limit + body.defaults.excess:
+        each = np.abs(bounded.rows @ stretched).max(axis=1, initial=0.0)
+        which = bounded.names[np.argmax(each)] if each.size else "the tangent"
+        what = f"{which} reaches {largest:.4g} rad, beyond the limit {limit:.4g}"
+    elif depth.max() > _SLACK:
+        how = "overlap" if link_width(body) else "cross each other"
+        what = f"links {how} at phase {_CHECKED[np.argmax(depth)]:.3f}"
+    if what:
+        raise ProblemError(f"guess is inadmissible: {what}; make its amplitude smaller.")
+
+
+def largest_amplitude(problem: Any, gait: Any) -> float:
+    """`largest_factor` of a gait that keeps limits of speed, too."""
+    angles = gait.angles(_EVENLY)
     largest = largest_factor(problem.body, problem.joint_limit, angles, gait.rest)
     share = largest_share(gait, problem.largest_speeds)
     return min(largest, 1 / share) if share else largest
 
 
-def on_speed_floor(problem: Problem, gait: AnyGait) -> bool:
+def on_speed_floor(problem: Any, gait: Any) -> bool:
     """True if a gait is as slow as ``smallest_shape_speed`` allows, which then decided its size."""
     return gait.shape_speed < problem.smallest_shape_speed * (1 + _ON_FLOOR)
 
 
-def is_visible(gait: AnyGait) -> bool:
+def is_visible(gait: Any) -> bool:
     """True if a person sees a gait move: a joint swings by 9 degrees or more to either side."""
     return bool(np.ptp(gait.angles(_PERIOD), axis=1).max() >= 2 * _VISIBLE)
 
@@ -68,13 +213,13 @@ def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndar
     return (order.T - within) / n
 
 
-def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> AnyGait:
+def latin_hypercube_gait(problem: Any, seed: int, start: int) -> Any:
     """Start of a Latin hypercube over a problem's class of gaits that clearly moves, or the fastest
     of many. `ProblemError` if no admissible gait is as fast as ``smallest_shape_speed``."""
     block, row = divmod(start, BLOCK)
     seeds, n_joint = problem.gait.start_class, problem.body.n_joint
     least = problem.smallest_shape_speed
-    fastest: AnyGait = None
+    fastest: Any = None
     dimension = seeds.sample_dimension(n_joint) + 1
     rng = np.random.default_rng([seed, block]).spawn(1)[0]  # as newer releases of SciPy do
     unit = latin_hypercube(BLOCK, dimension, rng)[row]
@@ -94,7 +239,7 @@ def latin_hypercube_gait(problem: Problem, seed: int, start: int) -> AnyGait:
     )
 
 
-def _with_amplitude(problem: Problem, gait: AnyGait, fraction: float) -> AnyGait:
+def _with_amplitude(problem: Any, gait: Any, fraction: float) -> Any:
     """The class member nearest to a gait, at a fraction of the largest admissible amplitude."""
     seeds = problem.gait.start_class
     member = seeds.member(seeds.parameters(gait), problem.body.n_joint)
@@ -102,7 +247,7 @@ def _with_amplitude(problem: Problem, gait: AnyGait, fraction: float) -> AnyGait
     return member.scaled(fraction * largest) if np.isfinite(largest) else member
 
 
-def perturbed_gait(problem: Problem, seed: int, start: int) -> AnyGait:
+def perturbed_gait(problem: Any, seed: int, start: int) -> Any:
     """Start near the guess of a problem: its coefficients move by normals of 0.3 rad, and it
     shrinks until it is admissible."""
     rng = np.random.default_rng([seed, start])
@@ -114,11 +259,11 @@ def perturbed_gait(problem: Problem, seed: int, start: int) -> AnyGait:
     raise ProblemError(f"found no admissible start within {_SPREAD:g} rad of the guess.")
 
 
-def start_gait(problem: Problem, sampler: str, seed: int, start: int) -> AnyGait:
+def start_gait(problem: Any, sampler: str, seed: int, start: int) -> Any:
     return (perturbed_gait if sampler == PERTURBED else latin_hypercube_gait)(problem, seed, start)
 
 
-def to_body(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> AnyGait:
+def to_body(gait: Any, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> Any:
     """Transfer a gait of a chain to another body: every link gets the mean tangent angle of the
     part of the body it covers. Where links would cross, or a joint pass its limit, all angles
     shrink."""
@@ -128,12 +273,12 @@ def to_body(gait: AnyGait, body: Chain, other: Body, joint_limit: Limit = float(
 
 
 def to_class(
-    gait_class: AnyClass,
-    gait: AnyGait,
+    gait_class: Any,
+    gait: Any,
     body: Body,
     joint_limit: Limit = float(np.pi),
     smallest_shape_speed: float = 0.1,
-) -> AnyGait:
+) -> Any:
     """Transfer a gait to a class, and make it admissible: a truncated series overshoots, and cuts
     corners."""
     start = gait_class.through(gait)
@@ -147,7 +292,7 @@ def to_class(
     )
 
 
-def prolong(problem: Problem, gait: AnyGait, gait_class: AnyClass, **changes: object) -> Problem:
+def prolong(problem: Any, gait: Any, gait_class: Any, **changes: object) -> Any:
     """The problem in another class of gaits, to be searched from a known optimum of any class;
     delta stays what it is relative to the shape speed."""
     relative = problem.delta / (1.0 if problem.gait.relative_delta else problem.guess.length)

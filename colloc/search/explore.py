@@ -19,7 +19,6 @@ from functools import lru_cache, partial
 import numpy as np
 
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.guesses import travelling_wave
 from colloc.gaits.harmonic import ellipse
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import (
@@ -28,6 +27,7 @@ from colloc.gaits.starts import (
     on_speed_floor,
     to_body,
     to_class,
+    travelling_wave,
 )
 from colloc.mechanics.chain import Chain
 from colloc.reduced.program import ReducedProgram

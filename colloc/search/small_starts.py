@@ -20,11 +20,10 @@ from colloc.bounds.motions import (
 )
 from colloc.gaits.bspline import Corners
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.guesses import largest_factor
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
-from colloc.gaits.starts import to_class
+from colloc.gaits.starts import largest_factor, to_class
 from colloc.mechanics.law import rate_independent
 from colloc.search.checkpoint import checkpointed
 from colloc.system.errors import NotConvergedError

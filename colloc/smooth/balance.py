@@ -1,15 +1,13 @@
 """Smooth bodies by their tangent angle Theta(s, t), and their balance on composite Gauss panels.
 
-Positions are integrals of cos and sin of Theta with the panels' integration matrices (paper, eqs.
-x0, y0), so the body is inextensible to rounding. The rigid velocity ``z = (u, v, omega)`` is that
-of a *reference*, one of the panels' edges: velocity of the point and rotation rate of the tangent
-there. Path integrals start at the reference and rates are relative to it, so a stretch that keeps
-its shape moves with relative precision, however slow it is. What `solve_smooth` takes and returns
-is that of the tail in the axes in which Theta is measured, and the rotation rate of those axes.
+The rigid velocity ``z = (u, v, omega)`` is that of a *reference*, one of the panels' edges:
+velocity of the point and rotation rate of the tangent there. Path integrals start at the reference
+and rates are relative to it, so a stretch that keeps its shape moves with relative precision,
+however slow it is. What `solve_smooth` takes and returns is that of the tail in the axes in which
+Theta is measured, and the rotation rate of those axes.
 
 At stick the velocity changes over lengths ~ delta / (rotation rate), and shapes may be sharp. So
-`solve_smooth` compares each panel's integrals with those over its halves, halves panels that differ
-by more than the tolerance and solves again, by the iteration of `colloc.mechanics.damped_newton`.
+`solve_smooth` halves panels whose integrals differ from those over their halves, and solves again.
 """
 
 from __future__ import annotations
@@ -40,20 +38,15 @@ Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A periodic motion Theta(s, t).
+    """A periodic motion Theta(s, t)."""
 
-    angle, rate: Theta [rad] and its time derivative [rad/period]. breaks: phase ``(n_time,)`` to
-    arc lengths ``(n_break, n_time)`` where Theta is not smooth; panels end there. stages: phases
-    from 0 to the end of the part that has to be solved, between which the motion is smooth in time.
-    antipodal: Theta(s, t + 1/2) = -Theta(s, t), the second half period mirrors the first (paper,
-    section VI).
-    """
-
-    angle: Field
-    rate: Field
+    angle: Field  # Theta [rad]
+    rate: Field  # its time derivative [rad/period]
     breaks: Callable[[np.ndarray], np.ndarray] | None = None
+    """Phase ``(n_time,)`` to arc lengths ``(n_break, n_time)`` where Theta is not smooth."""
     stages: tuple[float, ...] = (0.0, 1.0)
-    antipodal: bool = False
+    """Phases from 0 to the end of the solved part, between which it is smooth in time."""
+    antipodal: bool = False  # Theta(s, t + 1/2) = -Theta(s, t)
 
     def __post_init__(self) -> None:
         stages, end = self.stages, 0.5 if self.antipodal else 1.0
@@ -72,14 +65,13 @@ def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, ...]:
 
 @dataclass(frozen=True, eq=False)
 class PanelGrid:
-    """Gauss panels on the arc length, one column a time point (or a single column for all).
-
-    edges: ascending from 0 to 1, ``(n_panel + 1, n_time)``; panels of width zero fill up columns
-    that need fewer. order: Gauss nodes a panel.
-    """
+    """Gauss panels on the arc length, one column a time point (or a single column for all);
+    properties of nodes are ``(n_panel * order, n_time)``."""
 
     edges: np.ndarray
-    order: int = 8
+    """Ascending from 0 to 1, ``(n_panel + 1, n_time)``; panels of width zero fill up columns that
+    need fewer."""
+    order: int = 8  # Gauss nodes a panel
 
     @property
     def n(self) -> int:
@@ -91,18 +83,16 @@ class PanelGrid:
 
     @property
     def widths(self) -> np.ndarray:
-        """Width of the panel of each node, ``(n_panel * order, n_time)``."""
+        """Width of the panel of each node."""
         return np.repeat(np.diff(self.edges, axis=0), self.order, axis=0)
 
     @property
     def nodes(self) -> np.ndarray:
-        """Arc length of the nodes, ``(n_panel * order, n_time)``."""
         left = np.repeat(self.edges[:-1], self.order, axis=0)
         return left + np.tile(self.gauss.c, self.n)[:, None] * self.widths
 
     @property
     def weights(self) -> np.ndarray:
-        """Quadrature weights, ``(n_panel * order, n_time)``."""
         return np.tile(self.gauss.b, self.n)[:, None] * self.widths
 
     def integrate(self, integrand: Array, reference: int) -> Array:
@@ -152,8 +142,7 @@ def curve(
 
 
 def node_velocity(body: Curve, z: Array) -> tuple[Array, Array]:
-    """Tangential and normal velocity of the nodes when the reference moves with z ``(3,
-    n_time)``."""
+    """Tangential and normal velocity of the nodes when the reference moves with z."""
     u, v, omega = z[0:1, :], z[1:2, :], z[2:3, :]
     return (
         body.cos * u + body.sin * v + body.arm_s * omega + body.shape_s,
@@ -253,12 +242,8 @@ class PanelBatch:
         return np.stack([row.reshape(panels.n, panels.order, -1).sum(axis=1) for row in weighted])
 
     def bending_power(self, z: np.ndarray, delta: np.ndarray | float) -> np.ndarray:
-        """Power of what bends the body ``(n,)``.
-
-        The moment of all force F ahead of s has the derivative ``-t x F(s)``; its work on the
-        curvature is, by parts, ``-int (n . F) dTheta/dt ds``. In balance that is the power
-        dissipated.
-        """
+        """Power of what bends the body ``(n,)``, the work of the moment of all force F ahead of s
+        on the curvature: by parts ``-int (n . F) dTheta/dt ds``."""
         body, panels = self.curve, self.panels
         fs, fn = self.friction.density(*node_velocity(body, z), delta)
         force = fs * body.cos - fn * body.sin, fs * body.sin + fn * body.cos
@@ -269,27 +254,18 @@ class PanelBatch:
 
 @dataclass(frozen=True, eq=False)
 class SmoothSolution:
-    """A smooth body in balance; arrays of length n_time unless stated.
+    """A smooth body in balance; arrays of length n_time unless stated."""
 
-    t: phases. z: tail velocities ``(3, n_time)``. power: dissipated by friction. centre: velocity
-    of the centre of mass ``(2, n_time)``. force: net force and torque about the tail or, where the
-    velocities were solved for, about the part at rest ``(3, n_time)``. bending_power: of what bends
-    the body; equals `power` in balance. power_inside: the part of it done on the arcs `regions`.
-    slowest: smallest speed of a whole panel. residual: as of `BalanceSolution`. quadrature_error:
-    largest panel's difference from its halves, in force or power. iterations: steps over all
-    refinements.
-    """
-
-    t: np.ndarray
-    z: np.ndarray
-    power: np.ndarray
-    centre: np.ndarray
-    force: np.ndarray
-    bending_power: np.ndarray
-    power_inside: np.ndarray
-    slowest: np.ndarray
-    residual: np.ndarray
-    quadrature_error: np.ndarray
+    t: np.ndarray  # phases
+    z: np.ndarray  # tail velocities (3, n_time)
+    power: np.ndarray  # dissipated by friction
+    centre: np.ndarray  # velocity of the centre of mass (2, n_time)
+    force: np.ndarray  # net force and torque about the tail, or the part at rest, (3, n_time)
+    bending_power: np.ndarray  # of what bends the body; equals `power` in balance
+    power_inside: np.ndarray  # `power` on the arcs `regions`
+    slowest: np.ndarray  # smallest speed of a whole panel
+    residual: np.ndarray  # as of `BalanceSolution`
+    quadrature_error: np.ndarray  # of the worst panel, from its halves, in force or power
     iterations: np.ndarray
     tolerance: float
 
@@ -324,12 +300,10 @@ def solve_smooth(
 ) -> SmoothSolution:
     """Velocities that put a smooth body in force and torque balance at phases t ``(n_time,)``.
 
-    panels, order: equal panels to start from, besides the motion's breaks, and Gauss nodes a panel.
-    quadrature_tolerance: largest difference in force, torque or power between a panel and its
-    halves; 0 keeps the first panels. regions: arcs whose power is reported separately; their ends
-    should be breaks. method: "auto", "newton" or "fixed_point". grid: panels that are the same at
-    all times, instead of such that adapt. start: tail velocities ``(3, n_time)`` to start from;
-    slide: to slide with, instead of those that balance. Others as of `solve_balance`.
+    The first panels end at the motion's breaks; a `quadrature_tolerance` of 0 keeps them, and a
+    `grid` is the same at all times. `regions` are arcs whose power is reported separately. Tail
+    velocities ``(3, n_time)``: `start` to start from; `slide` to slide with, instead of those that
+    balance. Others as of `solve_balance`.
     """
     check_finite(positive=True, delta=delta)
     t = np.atleast_1d(np.asarray(t, dtype=float))
@@ -436,12 +410,9 @@ def _panel_error(
     delta: np.ndarray,
     speed: np.ndarray,
 ) -> np.ndarray:
-    """Difference of each panel from its two halves, ``(n_panel, n_time)``.
-
-    Every panel is taken as a body that moves with its left end, so that an error is charged to the
-    panel that makes it. Compared are force, torque and power, and the velocity of the right end in
-    units of the speed of the slowest panel, which decides the friction there.
-    """
+    """Difference of each panel, as a body that moves with its left end, from its two halves,
+    ``(n_panel, n_time)``: in force, torque and power, and in the velocity of the right end in units
+    of the speed of the slowest panel, which decides the friction there."""
     edges = batch.panels.edges
     left, right = edges[:-1].ravel(), edges[1:].ravel()
     slow = delta[0] + batch.panel_speed(z).min(axis=0)

@@ -1,15 +1,11 @@
-r"""Smooth bodies whose motion is prescribed, always solved on panels that adapt: shapes may be as
-sharp, and delta as small, as one likes. Their shape coordinates are the phase, as a point on a
-circle (`colloc.gaits.prescribed`).
+r"""Smooth bodies whose motion is prescribed, always solved on panels that adapt. Their shape
+coordinates are the phase, as a point on a circle (`colloc.gaits.prescribed`).
 
 A concertina crawler (paper, section VI) is straight but for one or two travelling bumps. On a bump
 of arc length ``w`` centred at ``c``, with ``x = 2 (s - c)/w`` in [-1, 1], the tangent angle is
 ``Theta = a odd(x) + b even(x)``, zero elsewhere,
 
     odd = -k x (1 - x^2)^3,    k = 7^(7/2)/6^3 (so that max odd = 1),    even = (1 - x^2)^3.
-
-The odd part shortens the body by ``w (1 - mean cos Theta)``, the even part shifts it sideways. A
-bump that travels without changing keeps its chord, so both straight parts can rest.
 
 One bump (figure 13A to D), in the region ``|s - 1/2| <= epsilon``: a grows from 0 to `amplitude` at
 the rear end, the front half at rest; the bump travels to the front end; a falls to 0, the rear at
@@ -19,8 +15,6 @@ Two bumps (figure 13E), in regions around 1/4 and 3/4, Theta(1 - s) = -Theta(s):
 across its path. ``(a, b) = A(phi) (sin phi, cos phi)`` with A(0) = `amplitude` and A(phi) such that
 the chord along the body stays constant. phi goes from 0 to pi, bumps at the inner ends, the outer
 parts at rest; the bumps travel outwards; phi returns, the middle at rest; the bumps travel back.
-
-For epsilon -> 0 the efficiency is 1/mu_f (one bump; 1/mu_b backwards), or 1/mu_t (two bumps).
 """
 
 from __future__ import annotations

@@ -36,12 +36,9 @@ _REPLAY_TOLERANCE = 1e-8
 
 
 class SmoothBody(Body):
-    """A curve of unit length. Below pi/2 it cannot cross itself; a point at rest moves along it and
-    makes no kinks; forces on all nodes would be too many variables for a full program.
-
-    A point rests at nearly every time: the panels of a search, which are the same at all times,
-    have to resolve delta over the rotation rate, and the influence of delta is of first order.
-    """
+    """A curve of unit length. Below pi/2 it cannot cross itself. A point rests at nearly all times,
+    and moves along it: no kinks, but panels of a search, which are the same at all times, have to
+    resolve delta over the rotation rate, and the influence of delta is of first order."""
 
     defaults = Defaults(
         coordinate="mode", quantity="mode",

@@ -8,8 +8,8 @@ import colloc
 from colloc import Basis, BSpline, Chain, Friction, Harmonic, ModalBody, Problem, ProblemError
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.gaits.gait_fields import class_from, fields, gait_from
-from colloc.gaits.guesses import initial_member
 from colloc.gaits.linear import enclosed_area
+from colloc.gaits.starts import initial_member
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.reduced.program import ReducedProgram
 from colloc.search.spaces import space_near

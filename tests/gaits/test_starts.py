@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Corners, Fourier, Harmonic, Polygon, Problem, ProblemError, ellipse
-from colloc.gaits.guesses import SAFE, checked_member, largest_factor
-from colloc.gaits.starts import latin_hypercube, latin_hypercube_gait, prolong, to_body, to_class
+from colloc.gaits.starts import (
+    SAFE,
+    checked_member,
+    largest_factor,
+    latin_hypercube,
+    latin_hypercube_gait,
+    prolong,
+    to_body,
+    to_class,
+)
 from colloc.mechanics.contact import crossing_depth
 from colloc.search.solve import solve
 
