@@ -8,6 +8,7 @@ a program spends as much time on each side, and members are run through at const
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,9 @@ from colloc.gaits.symmetry import (
     BILATERAL,
     NONE,
     SYMMETRIES,
-    both_halves,
     fraction,
     reduced,
     symmetric_samples,
-    take_images,
 )
 from colloc.numerics.mesh import Mesh
 from colloc.system.arguments import STATED_IF_SET, is_whole, named_arguments
@@ -112,21 +111,28 @@ class Corners(GaitFunction):
         """Phases of `vertices`, from 0 to the solved part of the period."""
         return fraction(self.symmetry) * self._along / self._along[-1]
 
+    @cached_property
+    def _whole(self) -> tuple[np.ndarray, np.ndarray]:
+        """Phases and vertices of the whole path, whose second half is the image of the first."""
+        phases, half = self.phases, self.vertices
+        if self.symmetry == NONE:
+            return phases, half
+        later, images = phases + 0.5, -half
+        if self.symmetry == BILATERAL:  # backwards, seen from the other end
+            later, images = 1.0 - phases[::-1], images[::-1, ::-1]
+        return np.append(phases, later[1:]), np.hstack([half, images[:, 1:]])
+
     @property
     def corner_phases(self) -> np.ndarray:
-        return both_halves(self.symmetry, self.phases)
+        return self._whole[0][1:-1]
 
     def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Angles and rates; at a corner those of the side ahead."""
-        phase, image = reduced(self.symmetry, t)
-        phases, vertices = self.phases, self.vertices
+        phase, _ = reduced(NONE, t)
+        phases, vertices = self._whole
         k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
         rates = (vertices[:, k + 1] - vertices[:, k]) / (phases[k + 1] - phases[k])
-        angles = vertices[:, k] + rates * (phase - phases[k])
-        return (
-            take_images(self.symmetry, angles, image),
-            take_images(self.symmetry, rates, image, derivative=1),
-        )
+        return vertices[:, k] + rates * (phase - phases[k]), rates
 
     def mapped(self, matrix: np.ndarray) -> Corners:
         return Corners(matrix @ self.corners, self.symmetry)

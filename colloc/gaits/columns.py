@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -83,17 +83,41 @@ class Basis(LinearClass):
         # columns are angles of all joints
         return isinstance(self.columns[0][0], tuple)
 
+    @cached_property
+    def _interpolated(self) -> tuple[Any, float, int]:
+        """A spline through the columns, its relative error, and the number of harmonics."""
+        from scipy.interpolate import make_interp_spline
+
+        values = np.array(self.columns)
+        values = values.reshape(-1, values.shape[-1]).T
+        n, largest = len(values), np.abs(values).max()
+        phases, closed = np.arange(n + 1) / n, np.vstack([values, values[:1]])
+        spline = make_interp_spline(phases, closed, _DEGREE, bc_type="periodic")
+
+        def residual(every: int) -> float:
+            kept = np.append(np.arange(0, n, every), n)
+            coarse = make_interp_spline(phases[kept], closed[kept], _DEGREE, bc_type="periodic")
+            return float(np.abs(coarse(phases) - closed).max() / largest)
+
+        # the error falls from each halving of the step to the next by about the same factor
+        half, quarter = residual(2), residual(4)
+        falls = np.clip(half / max(quarter, _ROUNDING), 0.5 ** (_DEGREE + 1), 1.0)
+        power = np.arange(n // 2 + 1)[:, None] ** 2 * np.abs(np.fft.rfft(values, axis=0)) ** 2
+        power = power.sum(axis=1)
+        left = 1 - np.cumsum(power) / power.sum()
+        return spline, float(half * falls), int(np.clip(np.argmax(left < _RESOLVED), 1, _MOST))
+
     @property
     def error(self) -> float:
         """Estimated error of interpolation, relative to the largest value."""
-        return _interpolate(self)[1]
+        return self._interpolated[1]
 
     @property
     def harmonics(self) -> int:  # type: ignore[override]
-        return _interpolate(self)[2]
+        return self._interpolated[2]
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        return _interpolate(self)[0](np.asarray(t) % 1.0, nu=derivative).T
+        return self._interpolated[0](np.asarray(t) % 1.0, nu=derivative).T
 
     def label(self, number: int) -> str:
         return super().label(number // len(self.columns[0]) if self._whole else number)
@@ -119,31 +143,6 @@ class Basis(LinearClass):
             f"{count} column{'s' * (count > 1)} {kind}, interpolated to {self.error:.0e}, "
             f"symmetry {self.symmetry}"
         )
-
-
-@lru_cache(maxsize=32)
-def _interpolate(kind: Basis) -> tuple[Any, float, int]:
-    """A spline through the columns, its relative error, and the number of harmonics."""
-    from scipy.interpolate import make_interp_spline
-
-    values = np.array(kind.columns)
-    values = values.reshape(-1, values.shape[-1]).T
-    n, largest = len(values), np.abs(values).max()
-    phases, closed = np.arange(n + 1) / n, np.vstack([values, values[:1]])
-    spline = make_interp_spline(phases, closed, _DEGREE, bc_type="periodic")
-
-    def residual(every: int) -> float:
-        kept = np.append(np.arange(0, n, every), n)
-        coarse = make_interp_spline(phases[kept], closed[kept], _DEGREE, bc_type="periodic")
-        return float(np.abs(coarse(phases) - closed).max() / largest)
-
-    # the error falls from each halving of the step to the next by about the same factor
-    half, quarter = residual(2), residual(4)
-    falls = np.clip(half / max(quarter, _ROUNDING), 0.5 ** (_DEGREE + 1), 1.0)
-    power = np.arange(n // 2 + 1)[:, None] ** 2 * np.abs(np.fft.rfft(values, axis=0)) ** 2
-    power = power.sum(axis=1)
-    left = 1 - np.cumsum(power) / power.sum()
-    return spline, float(half * falls), int(np.clip(np.argmax(left < _RESOLVED), 1, _MOST))
 
 
 def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:

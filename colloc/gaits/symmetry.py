@@ -41,15 +41,6 @@ def both_halves(symmetry: str, phases: np.ndarray) -> np.ndarray:
     return np.unique(both[(both > 0) & (both < 1)])
 
 
-def take_images(
-    symmetry: str, values: np.ndarray, image: np.ndarray, derivative: int = 0
-) -> np.ndarray:
-    """Replace columns `image` of angles ``(n_joint, n_time)``, or of rates, by their images."""
-    if symmetry == BILATERAL:  # time runs backwards
-        return np.where(image, -((-1) ** derivative) * values[::-1], values)
-    return np.where(image, -values, values) if symmetry == ANTIPODAL else values
-
-
 def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarray:
     """Sample the solved part of the symmetric gait nearest to a gait, ``(n_joint, count + 1)``.
 

@@ -22,7 +22,6 @@ from colloc.search.solve import solve
 from colloc.search.spaces import space_near
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.smooth.prescribed_body import Concertina
-from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
 
 BODY = CrawlerBody(0.05, panels=16)
@@ -60,22 +59,6 @@ def test_the_rate_of_the_angle_is_that_of_finite_differences():
     (q, rates), s, h = shapes(4), np.linspace(0.44, 0.56, 25)[:, None], 1e-6
     moved = (BODY.tangent(s, q + h * rates) - BODY.tangent(s, q - h * rates)) / (2 * h)
     np.testing.assert_allclose(BODY.turning(s, q, rates), moved, atol=1e-6)
-
-
-@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)])
-def test_balance_and_power_agree_with_adaptive_panels(friction):
-    (q, rates), delta = shapes(3), 1e-2
-    solved = BODY.solve(friction, q, rates, delta)
-    motion, (other, _) = (
-        BODY.motion(friction, q, rates, delta, solved),
-        accurate_motion(BODY, friction, q, rates, delta, None),
-    )
-    np.testing.assert_allclose(motion.z, other.z, atol=1e-4)
-    np.testing.assert_allclose(motion.centre, other.centre, atol=1e-4)
-    np.testing.assert_allclose(motion.power, other.power, rtol=1e-3)
-    stated = BODY.sliding(friction, q, rates, solved.z, delta)
-    assert np.abs(stated.force).max() < 1e-9
-    np.testing.assert_allclose(stated.power[0], motion.power, rtol=1e-11)
 
 
 def test_slopes_of_the_motion_are_those_of_finite_differences():

@@ -110,15 +110,6 @@ def test_bodies_answer_every_question_and_can_be_kept(body):
     )
 
 
-def test_sliding_at_the_balanced_velocity_leaves_no_force_and_elsewhere_does():
-    body, t = Concertina(epsilon=0.2, amplitude=1.2), np.array([0.05, 0.2, 0.45])
-    gait = Prescribed(schedule(body), "antipodal").member(np.empty(0), 2)
-    at = (Friction(), gait.angles(t), gait.rates(t))
-    solved = body.solve(*at, 1e-3)
-    assert np.abs(body.sliding(*at, solved.z, np.full((1, 3), 1e-3)).force).max() < 1e-8
-    assert np.abs(body.sliding(*at, solved.z + 0.1, np.full((1, 3), 1e-3)).force).max() > 1e-2
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

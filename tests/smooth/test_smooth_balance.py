@@ -150,23 +150,6 @@ def test_panels_resolve_the_layer_where_a_body_pivots(delta):
     assert smooth.quadrature_error.max() < 1e-10
 
 
-def test_chain_of_many_links_converges_to_the_smooth_body_with_isotropic_friction():
-    t, delta, errors = np.array([0.1]), 0.05, []
-    motion = Wave().prescribed()
-    smooth = solve_smooth(motion, Friction(), t, delta).require()
-    for n in (20, 40):
-        edges = np.linspace(0, 1, n + 1)
-        middle = 0.5 * (edges[1:] + edges[:-1])[:, None]
-        angles, rates = (
-            np.diff(motion.angle(middle, t), axis=0),
-            np.diff(motion.rate(middle, t), axis=0),
-        )
-        chain = solve_balance(Chain((1 / n,) * n), Friction(), angles, rates, delta).require()
-        frame_rate = chain.z[2] - motion.rate(middle[:1], t)[0]
-        errors.append(abs(frame_rate[0] - smooth.z[2, 0]))
-    assert errors[1] < 0.3 * errors[0]
-
-
 def test_unusable_input_is_named():
     with pytest.raises(ProblemError, match="delta must be a positive"):
         solve_smooth(Wave().prescribed(), Friction(), np.array([0.1]), 0.0)
