@@ -34,7 +34,7 @@ from colloc.mechanics.inertia import (
     tail_velocity,
 )
 from colloc.mechanics.law import Law
-from colloc.mechanics.native_kernel import kernel_momenta, native_kernel
+from colloc.mechanics.native_kernel import call_for_all, native_kernel
 
 N_OUT = 9
 """Tail velocity, velocity of the centre of mass, power, rates of the momenta."""
@@ -106,7 +106,10 @@ def momenta_at(
     library, (angles, rates, delta) = native_kernel(body, friction), shapes
     if library is not None:
         moving = Moving(body, friction, angles, rates, delta, None)
-        return kernel_momenta(library, moving, states, froude, columns=columns)
+        n_time, spin = states.shape[1], body.inertia_column()
+        found = np.empty((N_OUT, n_time)), np.empty((N_OUT, columns, n_time))
+        call_for_all(library.colloc_momenta, moving, spin, froude, states, columns, *found)
+        return found
     evaluate = _momenta_function(body, friction, differentiated=True)
     out, slopes = evaluate(angles, rates, states, delta, froude)
     by_output = slopes.full().reshape(N_OUT, -1, states.shape[1])

@@ -163,17 +163,6 @@ def _parameters(body: Any, friction: Law) -> tuple[Any, ...]:
     return (body.n_link, body.length_column(), body.mass_column(), law) if law.size else ()
 
 
-def kernel_momenta(
-    library: ctypes.CDLL, moving: Moving, states: np.ndarray, froude: float, *, columns: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Outputs of `colloc.dynamics.chain` ``(9, n_time)``, and derivatives ``(9, columns,
-    n_time)``."""
-    n_time, spin = moving.angles.shape[1], moving.body.inertia_column()
-    found = np.empty((9, n_time)), np.empty((9, columns, n_time))
-    call_for_all(library.colloc_momenta, moving, spin, froude, states, columns, *found)
-    return found
-
-
 def kernel_repeating(
     library: ctypes.CDLL,
     moving: Moving,

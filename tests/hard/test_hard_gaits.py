@@ -11,10 +11,11 @@ from tests.shared.laws import coulomb
 
 BODY = Chain()
 BILATERAL = Harmonic(1, "bilateral")
+SLOW = (0.01, 1, 1), (1, 0.01, 100), (0.01, 100, 1)
 
 
 def replayed(gait, delta, **settings):
-    return replay(BODY, Friction(), lambda t: (gait.angles(t), gait.rates(t)), delta, **settings)
+    return replay(BODY, Friction(), gait, delta, **settings)
 
 
 def test_small_gaits_scale_down_to_amplitude_1e_8():
@@ -50,14 +51,8 @@ def test_gaits_slower_than_delta_are_viscous_and_go_nowhere():
 def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, delta):
     """The replay knows better than the mesh: a wrong efficiency is never called solved, and the
     message says why."""
-    problem = Problem(
-        "coarse",
-        ellipse(0.0, 2.8, 1.3),
-        gait=BILATERAL,
-        intervals=intervals,
-        delta=delta,
-        mesh_tolerance=0,
-    )
+    at = {"intervals": intervals, "delta": delta, "mesh_tolerance": 0}
+    problem = Problem("coarse", ellipse(0.0, 2.8, 1.3), gait=BILATERAL, **at)
     solution = solve(problem, 1)
     if delta < 1e-9:
         # gradients then carry rounding of 1e-16 / delta: first-order conditions may not be reached
@@ -80,34 +75,19 @@ def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, del
         (100, 1, 1),
         (1, 1 + 1e-15, 1),
         (1, 100, 0.01),
-        *(
-            pytest.param(law, marks=pytest.mark.slow)
-            for law in ((0.01, 1, 1), (1, 0.01, 100), (0.01, 100, 1))
-        ),
+        *(pytest.param(law, marks=pytest.mark.slow) for law in SLOW),
     ],
     ids=str,
 )
 def test_extreme_coefficients_are_solved_or_refused(law):
     friction = coulomb(*law)
-    problem = Problem(
-        "extreme",
-        ellipse(0.2, 1.0, 0.6),
-        friction=friction,
-        gait=BILATERAL,
-        intervals=12,
-        delta=1e-3,
-    )
+    at = {"friction": friction, "gait": BILATERAL, "intervals": 12, "delta": 1e-3}
+    problem = Problem("extreme", ellipse(0.2, 1.0, 0.6), **at)
     solution = solve(problem, 1)
     if solution.status == SOLVED:
         assert solution.certificate.efficiency <= 1 / friction.smallest
         delta = solution.answer.delta  # lowered where the gait is slow for it
-        again = replay(
-            BODY,
-            friction,
-            lambda t: (solution.gait.angles(t), solution.gait.rates(t)),
-            delta,
-            tolerance=1e-7,
-        )
+        again = replay(BODY, friction, solution.gait, delta, tolerance=1e-7)
         assert again.efficiency == pytest.approx(solution.efficiency, rel=2e-4)
     else:
         assert len(solution.message) > 30

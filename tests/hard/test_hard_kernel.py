@@ -44,10 +44,8 @@ def test_chains_of_any_number_of_links_take_the_same_steps(lengths):
     """At (1, 0.01, 100) many links have several balanced velocities, and rounding chooses: both are
     roots to 1e-16."""
     rng = np.random.default_rng(5)
-    angles, rates = (
-        rng.uniform(-3, 3, (len(lengths) - 1, 60)),
-        rng.normal(size=(len(lengths) - 1, 60)),
-    )
+    shape = len(lengths) - 1, 60
+    angles, rates = rng.uniform(-3, 3, shape), rng.normal(size=shape)
     start = rng.normal(size=(3, 60))
     for coefficients in LAWS:
         for delta in (1e-2, 1e-6):

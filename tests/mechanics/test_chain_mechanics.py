@@ -187,13 +187,7 @@ def test_the_kernel_says_what_numpy_and_casadi_say(law, body, delta, size):
 def test_casadi_says_the_same(law, body):
     angles, rates = random_instants(1, n_joint=body.n_joint)
     rng, n_force = np.random.default_rng(3), len(body.contact.force_names)
-    given = (
-        angles,
-        rates,
-        rng.normal(size=(3, 1)),
-        rng.normal(size=(n_force, 1)),
-        np.array([[0.01]]),
-    )
+    given = angles, rates, *(rng.normal(size=(n, 1)) for n in (3, n_force)), np.array([[0.01]])
     symbols = [ca.SX.sym("x", len(part)) for part in given]
 
     def said(q, r, z, f, delta):

@@ -124,11 +124,8 @@ def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
     assert 0.1 < share[0] < 0.9
     errors, blind = [], []
     for size in (1e-2, 5e-3, 2.5e-3):
-        moved = Fourier(
-            np.zeros(2),
-            AROUND_THE_CORNER.cos + size * np.array([[0.3], [-0.8]]),
-            AROUND_THE_CORNER.sin,
-        )
+        cos = AROUND_THE_CORNER.cos + size * np.array([[0.3], [-0.8]])
+        moved = Fourier(np.zeros(2), cos, AROUND_THE_CORNER.sin)
         height = corner_peak(moved)[2]
         cut = float(np.array(check.cut(moved.angles(time), share)).ravel()[0])
         errors.append(abs(cut - height))
@@ -158,11 +155,8 @@ def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_an
 def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
     """By signs of areas, for one shape at a time, and all pairs that are three links apart at
     least."""
-    body, rng, found = (
-        Chain((0.05, 0.2, 0.1, 0.15, 0.2, 0.1, 0.2), width=width),
-        np.random.default_rng(5),
-        0,
-    )
+    body = Chain((0.05, 0.2, 0.1, 0.15, 0.2, 0.1, 0.2), width=width)
+    rng, found = np.random.default_rng(5), 0
     for angles in rng.uniform(-2.8, 2.8, (300, 6, 1)):
         at = (np.array([1, 1j]) @ np.stack(body.joints(angles))[..., 0]).ravel()
 
@@ -189,18 +183,14 @@ def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
 @pytest.mark.parametrize("lengths", [(1 / 3,) * 3, (0.3, 0.2, 0.15, 0.35)], ids=len)
 def test_a_body_in_a_mirror_meets_itself_on_the_other_side_as_deep(lengths):
     """And a contact is positive where, and only where, the links two apart cross."""
-    body, angles = (
-        Chain(lengths),
-        np.random.default_rng(8).uniform(-2.9, 2.9, (len(lengths) - 1, 400)),
-    )
+    body, rng = Chain(lengths), np.random.default_rng(8)
+    angles = rng.uniform(-2.9, 2.9, (body.n_joint, 400))
     here, mirrored = (
         {near.name: near.pair(sign * angles) for near in body.contacts()} for sign in (1, -1)
     )
     for name, near in here.items():
-        other = mirrored[
-            name.replace("left", "RIGHT").replace("right", "left").replace("RIGHT", "right")
-        ]
-        np.testing.assert_allclose(near, other, rtol=0, atol=1e-13)
+        side, other = ("left", "right") if "left" in name else ("right", "left")
+        np.testing.assert_allclose(near, mirrored[name.replace(side, other)], rtol=0, atol=1e-13)
     pairs = [(i, i + 2) for i in range(len(lengths) - 2)]
     crossed = np.max([np.minimum(*near) for near in here.values()], axis=0)[0] > 0
     deep = crossing_depth(body, angles, pairs)

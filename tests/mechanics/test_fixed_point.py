@@ -24,17 +24,9 @@ def random_instants(seed, count, n_joint=2):
 @pytest.mark.parametrize("delta", [1e-1, 1e-4])
 def test_fixed_point_and_newton_agree(delta):
     angles, rates = random_instants(13, 200)
-    newton = solve_balance(Chain(), ISOTROPIC, angles, rates, delta, tolerance=1e-13)
-    fixed = solve_balance(
-        Chain(),
-        ISOTROPIC,
-        angles,
-        rates,
-        delta,
-        tolerance=1e-13,
-        method="fixed_point",
-        max_iterations=5000,
-    )
+    at = Chain(), ISOTROPIC, angles, rates, delta
+    newton = solve_balance(*at, tolerance=1e-13)
+    fixed = solve_balance(*at, tolerance=1e-13, method="fixed_point", max_iterations=5000)
     assert newton.converged.all()
     assert fixed.converged.all()
     np.testing.assert_allclose(newton.z, fixed.z, atol=1e-10)

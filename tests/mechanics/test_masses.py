@@ -33,28 +33,17 @@ def test_what_joints_do_beyond_friction_is_the_growth_of_kinetic_energy():
     """From the start of a period to any phase of it: work of the joints = work against friction +
     Fr times what E grows by."""
     froude = 0.3
-    problem = Problem(
-        "heavy_tail",
-        body=BODY,
-        friction=Friction(mu_t=2, mu_f=1, mu_b=1),
-        gait=Harmonic(1),
-        froude=froude,
-        delta=1e-2,
-    )
+    at = {"friction": Friction(mu_t=2), "gait": Harmonic(1), "froude": froude, "delta": 1e-2}
+    problem = Problem("heavy_tail", body=BODY, **at)
     solution = evaluate(problem.with_(mesh_tolerance=1e-4), ellipse(0.2, 0.9, 0.8))
     robot = solution.robot(length=1.0, mass=1.0, period=(1 / (9.81 * froude)) ** 0.5)
     t = np.linspace(0, 1, 2001)
     motion = solution.sample(t)
-    beyond = (robot.torques(t) / robot.torque_unit * motion.rates).sum(axis=0) - solution.power(
-        motion
-    )
+    spent = (robot.torques(t) / robot.torque_unit * motion.rates).sum(axis=0)
+    beyond = spent - solution.power(motion)
     gained = np.concatenate([[0.0], np.cumsum(0.5 * (beyond[1:] + beyond[:-1]) * np.diff(t))])
-    growth = np.array(
-        [
-            energy(*instant)
-            for instant in zip(motion.angles.T, motion.rates.T, motion.z.T, strict=True)
-        ]
-    )
-    growth = froude * (growth - growth[0])
+    instants = zip(motion.angles.T, motion.rates.T, motion.z.T, strict=True)
+    growth = froude * np.array([energy(*instant) for instant in instants])
+    growth -= growth[0]
     assert np.ptp(growth) > 0.03 * solution.work
     np.testing.assert_allclose(gained, growth, rtol=0, atol=1e-2 * np.ptp(growth))

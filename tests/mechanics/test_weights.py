@@ -50,31 +50,19 @@ def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_them
 ):
     """A straight body that slides as a whole, forwards, backwards and sideways; couples by a turn
     about a link's own end."""
-    body, law, straight, delta = (
-        Chain(LENGTHS, weights=WEIGHTS),
-        coulomb(*mu),
-        np.zeros((2, 3)),
-        1e-9,
-    )
+    body, law, straight = Chain(LENGTHS, weights=WEIGHTS), coulomb(*mu), np.zeros((2, 3))
     most = body.contact.largest_forces(law).ravel()
     along, across, couples = np.split(most, 3)
     ways = np.array([[1.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
-    found = np.abs(body.forces(law, straight, np.zeros((2, 3)), ways, delta))
+    found = np.abs(body.forces(law, straight, straight, ways, 1e-9))
     np.testing.assert_allclose(found[:3, :2].max(axis=1), along)
     np.testing.assert_allclose(found[3:6, 2], across)
     np.testing.assert_allclose(along, max(mu[1:]) * np.array(WEIGHTS))
     # a link that turns about its middle pushes back alike on both halves: the couple is that of
     # half its weight a quarter away
-    spinning = np.abs(
-        body.forces(
-            law,
-            straight[:, :1],
-            np.zeros((2, 1)),
-            np.array([[0.0], [-LENGTHS[0] / 2], [1.0]]),
-            delta,
-        )
-    )
-    assert spinning[6, 0] == pytest.approx(couples[0])
+    turn = np.array([[0.0], [-LENGTHS[0] / 2], [1.0]])
+    spinning = body.forces(law, straight[:, :1], straight[:, :1], turn, 1e-9)
+    assert abs(spinning[6, 0]) == pytest.approx(couples[0])
     angles, rates = random_instants(200)
     z = np.random.default_rng(1).normal(size=(3, 200))
     assert (np.abs(body.forces(law, angles, rates, z, 1e-9)) <= most[:, None] * (1 + 1e-12)).all()
@@ -82,12 +70,8 @@ def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_them
 
 def test_the_replay_is_that_of_a_program_of_its_own():
     gait = Fourier([0.2, -0.1], [[1.2], [0.3]], [[0.2], [1.0]])
-    theirs = played(
-        Crawler(LENGTHS, (1.7, 1.0, 1.3), WEIGHTS),
-        lambda t: (gait.angles(t), gait.rates(t)),
-        1e-2,
-        1e-5,
-    )
+    crawler = Crawler(LENGTHS, (1.7, 1.0, 1.3), WEIGHTS)
+    theirs = played(crawler, lambda t: (gait.angles(t), gait.rates(t)), 1e-2, 1e-5)
     ours = replay(Chain(LENGTHS, weights=WEIGHTS), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait, 1e-2)
     assert ours.work == pytest.approx(theirs.work, rel=1e-4)
     assert ours.distance == pytest.approx(theirs.distance, rel=1e-4)
@@ -110,19 +94,13 @@ def test_a_problem_with_weights_is_solved_certified_and_kept(tmp_path):
 
 
 def test_a_bound_knows_the_weights_or_refuses():
-    heavy, budget = (
-        Chain(weights=(0.4, 0.2, 0.4)),
-        Budget(intervals=4, shapes=6, directions=12, rounds=2),
-    )
+    heavy = Chain(weights=(0.4, 0.2, 0.4))
+    budget = Budget(intervals=4, shapes=6, directions=12, rounds=2)
     plain, other = (efficiency_bound(body, Friction(), budget=budget) for body in (Chain(), heavy))
     assert abs(plain.sampled - other.sampled) > 1e-3
+    numbers = np.array(other.coefficients)
     with pytest.raises(ProblemError, match="weights"):
-        certify(
-            Domain(heavy, Friction(), np.pi),
-            other.potential_space(heavy),
-            np.array(other.coefficients),
-            0.6,
-        )
+        certify(Domain(heavy, Friction(), np.pi), other.potential_space(heavy), numbers, 0.6)
 
 
 MASSES = (0.1, 0.3, 0.6)
@@ -154,21 +132,10 @@ def test_a_body_with_masses_says_so_and_how_it_leans():
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        *(
-            ({"lengths": (0.3, 0.3, 0.4 + off)}, "body.lengths must add up to")
-            for off in (1e-3, -1e-3, 1e-10)
-        ),
-        *(
-            ({"weights": weights}, r"body\.weights")
-            for weights in (
-                (1.0,),
-                (0.5, 0.5, 0.5),
-                (0.5, 0.5, 0.0),
-                (0.5, 0.5, "x"),
-                (np.nan, 0.5, 0.5),
-                3.0,
-            )
-        ),
+        *(({"lengths": (0.3, 0.3, 0.4 + off)}, "must add up to") for off in (1e-3, -1e-3, 1e-10)),
+        *(({"weights": (0.5, 0.5, odd)}, r"body\.weights") for odd in (0.5, 0.0, "x", np.nan)),
+        ({"weights": (1.0,)}, "one for each of the 3 links"),
+        ({"weights": 3.0}, "sequence of numbers"),
         ({"masses": (0.5, 0.5)}, "one for each of the 3 links"),
         ({"masses": (0.5, 0.5, 0.5)}, "the body's mass 1"),
         ({"inertias": (0.1, -0.1, 0.1)}, "not negative"),
