@@ -51,7 +51,7 @@ static inline Interval h_of(Interval root_q, Interval q, Interval T, Interval r0
     return (log_of(argument) * 0.5 / root_q - 1.0) / q;
 }
 
-/* Dissipation and forces of one link: the closed forms of colloc/mechanics/link_friction.py. */
+/* Dissipation and forces of one link: the closed forms of colloc/mechanics/friction.py. */
 static inline void find_force(State *state, int i, double l, const double sigma[2], const Hinge *at, double delta)
 {
     const Interval vs = at->velocity[0], half = at->spin * 0.5 * l, vn = at->velocity[1] + half;
