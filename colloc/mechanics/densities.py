@@ -165,7 +165,7 @@ class _OfInstants:
         return "idle" in self._formula.names
 
     def _value(self, now: Instants) -> Array:
-        names = self._formula.names & VARIABLES.keys()
+        names = [name for name in VARIABLES if name in self._formula.names]
         return self._formula({name: getattr(now, name) for name in names})
 
     @cached_property
