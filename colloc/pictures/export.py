@@ -36,7 +36,7 @@ from colloc.mechanics.floor_contact import whole_links
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import Law, rate_independent
-from colloc.pictures.style import render
+from colloc.pictures import render
 from colloc.results.motion import RigidMotion
 from colloc.results.robot import Robot, joint_torques, pressing, quasi_static_torques
 from colloc.results.solution import Solution

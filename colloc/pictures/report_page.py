@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from contextlib import suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,10 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.contact import link_width
 from colloc.mechanics.floor_contact import FOOT, PAD, WHEEL
 from colloc.mechanics.inertia import GRAVITY
+from colloc.pictures import render
 from colloc.pictures.figure import Panel, mesh_errors, panels, robot_panels
 from colloc.pictures.movie import Frames, frames
-from colloc.pictures.style import INK, render, styled
+from colloc.pictures.style import INK, styled
 from colloc.results.motion import foot_kinds, hinges
 from colloc.results.robot import SLOW_ENOUGH, Robot
 from colloc.results.solution import SOLVED, Solution
@@ -30,7 +32,6 @@ from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import write_text
 
 _MOST_PLANES = 6
-_ANY_FLOOR = 0.5  # share of the stated friction for which a period is stated
 _UNKNOWN = ProblemError, NotConvergedError
 _FILM, _FILM_FRAMES, _FILM_PERIODS = (320, 200), 24, 2  # largest size [pixels] of that of a card
 _FOOT_WORDS = {
@@ -58,29 +59,15 @@ def report_page(
         solution.certificate,
         solution.problem.body.defaults,
     )
-    drawn, pace, floor = panels(solution), "", list[list[str]]()
+    drawn, slow, dry, floor = panels(solution), 0.0, "", list[list[str]]()
     if not problem.froude:
-        try:
-            froude = solution.slow_enough(SLOW_ENOUGH)
-            period = math.sqrt(1 / (GRAVITY * _ANY_FLOOR * froude))
-            pace = (
-                f"changes {100 * SLOW_ENOUGH:g} % or less up to a Froude number L/(gT²) of "
-                f"{froude:.2g}: a robot of 1 m on a floor with {_ANY_FLOOR:g} of this friction, "
-                f"from {period:.2g} s a period"
-            )
-        except _UNKNOWN:
-            pass
-    dry = "d/W between {:.8f} and {:.8f}".format(*certificate.dry or (0, 0))
-    if certificate.dry is None:
-        try:
-            dry = str(solution.dry())
-        except _UNKNOWN:
-            dry = ""
-    try:
+        with suppress(*_UNKNOWN):
+            slow = solution.slow_enough(SLOW_ENOUGH)
+    with suppress(*_UNKNOWN):
+        dry = "" if certificate.dry else str(solution.dry())
+    with suppress(*_UNKNOWN):
         slopes = solution.sensitivity()
         floor = [[each.name, f"{each.now:.4g}", *slopes.beside(each)] for each in slopes.seen]
-    except _UNKNOWN:
-        pass
     planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
     courses = {
         "angles": f"{names.quantity}s",
@@ -93,7 +80,8 @@ def report_page(
         problem=problem,
         certificate=certificate,
         solved=solution.status == SOLVED,
-        pace=pace,
+        slow=slow,
+        gravity=GRAVITY,
         dry=dry,
         floor=floor,
         gap=gap.strip(),

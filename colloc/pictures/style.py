@@ -1,4 +1,4 @@
-"""Style, colours (Okabe and Ito) and saving of figures, made without pyplot; text of templates."""
+"""Style, colours (Okabe and Ito) and saving of figures, which are made without pyplot."""
 
 from __future__ import annotations
 
@@ -83,16 +83,3 @@ def save(
 def snapshot_colours(count: int) -> np.ndarray:
     """Colours from light (first) to dark (last)."""
     return matplotlib.colormaps[PHASE](np.linspace(0.15, 1.0, count))
-
-
-def render(template: str, /, **values: Any) -> str:
-    """Text of a template in `assets`; its filter ``g`` writes numbers to nine digits."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
-
-    templates = Environment(
-        loader=PackageLoader("colloc.pictures", "assets"), autoescape=True,
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    templates.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
-    templates.filters["g"] = lambda value: " ".join(f"{x:.9g}" for x in np.ravel(value))
-    return templates.get_template(template).render(**values)

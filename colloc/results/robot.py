@@ -34,21 +34,9 @@ if TYPE_CHECKING:
 SLOW_ENOUGH = 0.01  # share of the efficiency that inertia may take from a quasi-static gait
 _SAME_PACE = 0.01  # relative difference of Froude numbers that counts as none
 _ACCURACY = 1e-6  # of the momenta with inertia
-_SMALLEST_LOSS, _SMALLEST_TURN = 1e-3, 0.1  # share, and degrees per period, that are stated
 _LARGEST = 1e9  # of metres, kilograms and seconds; the smallest is its inverse
 _INSTANTS, _A_SIDE = 2000, 8  # samples of a period, and of a side of a polygon, at least
 _UNKNOWN = ProblemError, NotConvergedError
-_SHEET = """\
-{name}: {length_m:g} m, {mass_kg:g} kg, {period_s:g} s a period ({status})
-  speed              {speed_m_per_s:.4g} m/s {travels}; \
-{body_lengths_per_period:.4g} body lengths a period
-  work               {work_per_period_J:.4g} J a period; \
-{motor_work_per_period_J:.4g} J without regeneration
-  power              mean {mean_power_W:.4g} W, peak {peak_power_W:.4g} W
-  cost of transport  {cost_of_transport:.4g}
-
-             torque [N m]      speed [rad/s]     power [W]
-             peak     r.m.s.   peak     r.m.s.   peak"""
 
 
 def joint_torques(
@@ -303,85 +291,16 @@ class Robot:
 
     def lines(self) -> list[str]:
         """Return the data sheet as lines of text."""
-        facts, coordinate = self.facts, self.solution.gait.motor_gait.coordinate
-        names = ("torque_N_m", "speed_rad_per_s")
-        columns = [facts[f"{kind}_{name}"] for name in names for kind in ("peak", "rms")]
-        rows = (
-            f"  {coordinate} {j:<3d}" + "".join(f"  {value:<7.3g}" for value in row).rstrip()
-            for j, row in enumerate(zip(*columns, facts["peak_joint_power_W"], strict=True), 1)
-        )
-        remarks = [f"  {sentence}" for sentence in self.sentences()]
-        return [*_SHEET.format(**facts).splitlines(), *rows, "", *remarks]
+        law, coordinate = self.solution.problem.law, self.solution.gait.motor_gait.coordinate
+        text: str = higher("pictures:render")(
+            "robot.txt", robot=self, f=self.facts, coordinate=coordinate, degrees=math.degrees,
+            paced=not rate_independent(law), with_inertia=self._with_inertia is not None,
+        )  # fmt: skip
+        return text.splitlines()
 
     def sentences(self) -> list[str]:
         """Return remarks on the numbers."""
-        f, solution, problem, said = self.facts, self.solution, self.solution.problem, list[str]()
-        if (shortest := f.get("shortest_period_s")) is not None:
-            text = f"Shortest period within the speed limits: {shortest:.3g} s with the gait's own "
-            text += "timing"
-            if (speed := f.get("speed_at_shortest_period_m_per_s")) is not None:
-                text += f" ({speed:.4g} m/s)"
-            if (retimed := f.get("shortest_period_paced_by_speed_s")) is not None:
-                text += f", {retimed:.3g} s retimed (export --max-speed)"
-            said.append(f"{text}.")
-            if shortest > self.period * (1 + 1e-9):
-                said.append(
-                    f"{self.period:g} s, the period stated here, is too short for the joints."
-                )
-        if (used := f.get("torque_used")) is not None:
-            worst = int(np.argmax(used))
-            needs = f"Joint {worst + 1} needs {f['peak_torque_N_m'][worst]:.3g} N m"
-            has = f"and has {f['max_torque_N_m'][worst]:.3g}"
-            limits = ", ".join(f"{each / self.torque_unit:.4g}" for each in f["max_torque_N_m"])
-            if used[worst] <= 1:
-                said.append(
-                    f"Torque limits are met at this pace; joint {worst + 1} comes closest "
-                    f"({100 * used[worst]:.3g} %)."
-                )
-            elif max(f.get("torque_used_slowly", used)) <= 1:
-                said.append(
-                    f"{needs} at this pace {has}; slow motion needs less: take a longer period."
-                )
-            else:
-                said.append(
-                    f"{needs} {has}. Motors are too weak in slow motion as well, so a longer "
-                    f"period does not help: solve with torque_limit=({limits})."
-                )
-        if not rate_independent(problem.law):
-            said.append(
-                f"Torques depend on the pace under {problem.law.label}: its coefficients are taken "
-                f"to be those in units of this period."
-            )
-        pace = f"at this pace (Froude number L/(g T^2) = {f['froude_number']:.2g})"
-        slow, lost = f.get("slow_enough_period_s"), f.get("inertia_takes")
-        more = "" if slow is None else f"; 1 % or less for periods of {slow:.3g} s or more"
-        if problem.froude:
-            text = "Torques and power include inertia"
-            if (value := f.get("played_slowly")) is not None:
-                text += (
-                    f"; in slow motion the gait would have {problem.objective.short} {value:.4g} "
-                    f"instead of {solution.measured.value:.4g}"
-                )
-        elif self._with_inertia is None:
-            text = f"Quasi-static values; the effect of inertia {pace} is not known{more}"
-        else:
-            text = f"Values include inertia {pace}"
-            if lost is not None:
-                share = f"less than {100 * _SMALLEST_LOSS:g} %"
-                if abs(lost) > _SMALLEST_LOSS:
-                    share = f"{100 * abs(lost):.2g} %"
-                text = (
-                    f"Values include inertia, which {'costs' if lost >= 0 else 'adds'} {share} of "
-                    f"the efficiency {pace}{more}"
-                )
-                turns = math.degrees(f["rotation_by_inertia_rad"])
-                if abs(turns) > _SMALLEST_TURN:
-                    text += (
-                        f". It also turns the robot by {turns:.2g}° a period: it moves on an arc"
-                    )
-            slowly = solution.distance * self.length / self.period
-            text += f". Without inertia it would move at {slowly:.4g} m/s"
-        return [*said, f"{text}."]
+        return str(self).rpartition("\n\n")[2].replace("\n  ", "\n").strip().splitlines()
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
