@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from colloc.gaits.gait import GaitFunction
-from colloc.gaits.harmonic import series_of
+from colloc.gaits.harmonic import Fourier, series_of
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.symmetry import ANTIPODAL, NONE, both_halves
 from colloc.system.errors import ProblemError
 
 _INTERVALS_A_STAGE = 4
+_CIRCLE = Fourier(np.zeros(2), np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]]))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,13 +35,8 @@ class Phases(GaitFunction):
     def corner_phases(self) -> np.ndarray:
         return both_halves(self.symmetry, np.array(self.schedule))
 
-    def angles(self, t: np.ndarray) -> np.ndarray:
-        phase = 2 * np.pi * np.asarray(t, dtype=float)
-        return np.stack([np.cos(phase), np.sin(phase)])
-
-    def rates(self, t: np.ndarray) -> np.ndarray:
-        cos, sin = self.angles(t)
-        return 2 * np.pi * np.stack([-sin, cos])
+    def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _CIRCLE(t)
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ Robots, 1993),
 
     psi_j = 2 pi t - lag (j - (n + 1) / 2).
 
-A map into Fourier series that is linear in all parameters but the lag. The full program has the
-Fourier coefficients as parameters, too, and this map as constraints.
+A map into Fourier series, linear in all parameters but the lag; in the full program it is a
+constraint on the Fourier coefficients.
 """
 
 from __future__ import annotations
@@ -139,8 +139,7 @@ class Serpenoid(Harmonic):
         return SerpenoidSeries.from_table(table, float(parameters[0]))
 
     def parameters(self, gait: Fourier) -> np.ndarray:
-        """Parameters of the wave nearest to a series, after shifting its start phase if that is
-        free."""
+        """Of the wave nearest to a series, after shifting its start phase if that is free."""
         lag, start = self._lag_and_start(gait)
         gait = gait.resize(self.harmonics)
         if abs(start) > SAME_START:
@@ -156,8 +155,8 @@ class Serpenoid(Harmonic):
         return abs(self._lag_and_start(gait)[1]) <= SAME_START
 
     def _lag_and_start(self, gait: Fourier) -> tuple[float, float]:
-        """Lag of the wave nearest to a gait, at which the joints agree best on the wave they are
-        part of, and by how much it starts off the phase of members [rad]."""
+        """Lag at which the joints agree best on the wave they are part of, and by how much it
+        starts off the phase of members [rad]."""
         lag, gait = getattr(gait, "lag", None), gait.resize(self.harmonics)
 
         def disagreement(lag: float) -> float:
@@ -189,8 +188,8 @@ def _places(n_joint: int) -> np.ndarray:
 
 
 def _at_the_middle(gait: Fourier, lag: float) -> Any:
-    """Amplitudes ``cos - i sin`` of the harmonics of the wave of a lag that is nearest to a gait,
-    at the middle of the body, ``(n_harmonic,)``."""
+    """Amplitudes ``cos - i sin`` of the wave of a lag that is nearest to a gait, at the middle of
+    the body, ``(n_harmonic,)``."""
     k = np.arange(1, gait.n_harmonic + 1)
     phase = np.exp(1j * k * lag * _places(gait.n_joint)[:, None])
     return ((gait.cos - 1j * gait.sin) * phase).mean(axis=0)

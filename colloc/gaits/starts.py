@@ -55,9 +55,7 @@ _VISIBLE = np.pi / 20
 joint that moves alone at the default `Problem.smallest_shape_speed`."""
 _PERIOD = np.linspace(0.0, 1.0, 1001)
 _NEAR = 10.0
-"""First delta of a search from a known optimum, of the final one: friction more regularised prefers
-other gaits, and leaves it (six harmonics from the best of five: 0.4013, from 100 times the final
-delta 0.3998)."""
+"""First delta of a search from a known optimum, of the final one: more prefers other gaits."""
 
 
 def largest_factor(
@@ -121,8 +119,7 @@ def initial_member(gait_class: Any, wave: Fourier) -> Any:
 
 
 def checked_member(gait_class: Any, gait: Any) -> tuple[Any, float]:
-    """The gait of a class that a guess stands for, a path itself, and its shape speed [rad per
-    radian of phase]."""
+    """The gait of a class that a guess stands for, and its shape speed."""
     if gait_class.free and not gait_class.relative_delta:
         member = gait_class.member(gait_class.parameters(gait_class.through(gait)), gait.n_joint)
         return member, member.shape_speed
@@ -248,8 +245,7 @@ def _with_amplitude(problem: Any, gait: Any, fraction: float) -> Any:
 
 
 def perturbed_gait(problem: Any, seed: int, start: int) -> Any:
-    """Start near the guess of a problem: its coefficients move by normals of 0.3 rad, and it
-    shrinks until it is admissible."""
+    """Start near the guess: its coefficients move by normals, and it shrinks to be admissible."""
     rng = np.random.default_rng([seed, start])
     for _ in range(_ATTEMPTS):
         member = problem.gait.start_class.perturb(problem.guess, _SPREAD, 0, rng)

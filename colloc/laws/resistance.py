@@ -2,16 +2,14 @@
 
 Elliptic: dry friction with unequal coefficients and one balance. Its dissipation ``D = sqrt((mu_s
 vs)^2 + (mu_t vn)^2)``, with mu_s = mu_f or mu_b as vs > 0 or < 0, is convex, and the force minus
-its gradient (principle of maximal dissipation; Goyal, Ruina and Papadopoulos, Wear 143, 1991).
-Along or across itself that is Coulomb friction; oblique sliding differs. With the tangential
-velocity stretched by mu_s/mu_t the closed forms of equal coefficients hold on links.
+its gradient (Goyal, Ruina and Papadopoulos, Wear 143, 1991). With the tangential velocity stretched
+by mu_s/mu_t the closed forms of equal coefficients hold on links.
 
 Power: ``-(mu_s vs, mu_t vn) r^(power - 1)`` with ``r = sqrt(vs^2 + vn^2 + delta^2)``, between dry
 friction and viscous drag: wet granular beds, yield-stress fluids.
 
 Viscous: resistive-force theory of a slender body, ``-(tangential vs, normal vn)``. The balance is
-linear; distance and rotation belong to the path of a gait at any pace, work is smallest at constant
-power. Purcell's swimmer is a chain of three links under this law.
+linear; distance and rotation belong to the path of a gait at any pace.
 """
 
 from __future__ import annotations

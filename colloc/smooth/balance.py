@@ -150,18 +150,21 @@ def node_velocity(body: Curve, z: Array) -> tuple[Array, Array]:
     )
 
 
+def force_density(body: Curve, tangential: Array, normal: Array) -> tuple[Array, Array, Array]:
+    """Force per length in the axes of Theta, and its torque about the reference."""
+    return (
+        tangential * body.cos - normal * body.sin,
+        tangential * body.sin + normal * body.cos,
+        tangential * body.arm_s + normal * body.arm_n,
+    )
+
+
 def resultant(body: Curve, tangential: Array, normal: Array) -> Array:
     """Net force and torque about the reference of a force per length, ``(3, n_time)`` (paper, eq.
     ftb); of the velocity of the nodes, that of the centre of mass first."""
     xp = namespace(body.cos, tangential)
-    fs, fn = body.weight * tangential, body.weight * normal
-    return xp.stack(
-        [
-            xp.sum_rows(fs * body.cos - fn * body.sin),
-            xp.sum_rows(fs * body.sin + fn * body.cos),
-            xp.sum_rows(fs * body.arm_s + fn * body.arm_n),
-        ]
-    )
+    parts = force_density(body, tangential, normal)
+    return xp.stack([xp.sum_rows(body.weight * part) for part in parts])
 
 
 class PanelBatch:
@@ -232,12 +235,7 @@ class PanelBatch:
         body, panels = self.curve, self.panels
         vs, vn = node_velocity(body, z)
         fs, fn = self.friction.density(vs, vn, delta)
-        densities = (
-            fs * body.cos - fn * body.sin,
-            fs * body.sin + fn * body.cos,
-            fs * body.arm_s + fn * body.arm_n,
-            -(fs * vs + fn * vn),
-        )
+        densities = *force_density(body, fs, fn), -(fs * vs + fn * vn)
         weighted = (panels.weights * density for density in densities)
         return np.stack([row.reshape(panels.n, panels.order, -1).sum(axis=1) for row in weighted])
 
@@ -245,9 +243,9 @@ class PanelBatch:
         """Power of what bends the body ``(n,)``, the work of the moment of all force F ahead of s
         on the curvature: by parts ``-int (n . F) dTheta/dt ds``."""
         body, panels = self.curve, self.panels
-        fs, fn = self.friction.density(*node_velocity(body, z), delta)
-        force = fs * body.cos - fn * body.sin, fs * body.sin + fn * body.cos
-        ahead_x, ahead_y = (-panels.integrate(panels.widths * f, panels.n) for f in force)
+        force = self.friction.density(*node_velocity(body, z), delta)
+        along = force_density(body, *force)[:2]
+        ahead_x, ahead_y = (-panels.integrate(panels.widths * f, panels.n) for f in along)
         across = body.cos * ahead_y - body.sin * ahead_x
         return np.asarray(-(body.weight * self.rate * across).sum(axis=0))
 

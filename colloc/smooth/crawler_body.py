@@ -5,11 +5,10 @@ On an arc of length ``w = 2 epsilon share``, centred at ``1/2 + w C``, the tange
     Theta = sum_m b_m phi_m(x),  phi_m = (1 - x^2)^3 T_m(x),  x = 2 (s - 1/2)/w - 2 C in [-1, 1],
 
 and zero elsewhere; phi_1 is scaled to be the odd profile of `colloc.smooth.prescribed_body`. The
-place is a point on a circle, ``C = reach cos(pi p / LAP)``: the bump stays in its region whatever p
-is, at the rear end for p = LAP and -LAP, at the front end for p = 0. A crawler is a closed path of
-``(p, b_0, b_1, ...)`` with ``q(t + 1/2) = -q(t)``: a bump grows at the rear (p = LAP), travels (p
-falls to 0) and is flattened at the front; while the body is straight p falls to -LAP, at no cost;
-there the mirrored bump begins.
+place is a point on a circle, ``C = reach cos(pi p / LAP)``: at the rear end for p = LAP and -LAP,
+at the front end for p = 0. A crawler is a closed path of ``(p, b_0, b_1, ...)`` with ``q(t + 1/2) =
+-q(t)``: a bump grows at the rear (p = LAP), travels (p falls to 0) and is flattened at the front;
+while the body is straight p falls to -LAP, at no cost; there the mirrored bump begins.
 """
 
 from __future__ import annotations
