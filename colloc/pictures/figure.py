@@ -68,16 +68,32 @@ class Panel(NamedTuple):
         return figure
 
 
-def _draw_panel(axes: Axes, panels: dict[str, Panel], name: str) -> Axes:
-    if not isinstance(axes, Axes):
+def _plot(
+    drawn: Mapping[str, Callable[[Axes], object]],
+    ax: Any,
+    panel: str,
+    size: tuple[float, float] = (0, 0),
+    stacked: bool = False,
+) -> Any:
+    """One panel on axes, or else a figure of all of them beside or below each other."""
+    if ax is None:
+        with styled():
+            figure, rows = Picture(figsize=size), len(drawn) if stacked else 1
+            grid = figure.subplots(rows, len(drawn) // rows, sharex=stacked, squeeze=False)
+            for axes, draw in zip(grid.flat, drawn.values(), strict=True):
+                draw(axes)
+                if stacked:
+                    axes.label_outer()
+        return figure
+    if not isinstance(ax, Axes):
         raise ProblemError(
-            f"ax must be a matplotlib Axes to draw on, not {axes!r}; "
+            f"ax must be a matplotlib Axes to draw on, not {ax!r}; "
             f'plot().savefig("mine.png"), or .pdf, or .svg, writes a file.'
         )
-    if name not in panels:
-        raise ProblemError(f"there is no panel {name!r}; there are {', '.join(panels)}.")
-    panels[name].draw(axes)
-    return axes
+    if panel not in drawn:
+        raise ProblemError(f"there is no panel {panel!r}; there are {', '.join(drawn)}.")
+    drawn[panel](ax)
+    return ax
 
 
 def panels(solution: Solution) -> dict[str, Panel]:
@@ -109,8 +125,8 @@ def save_panels(solution: Solution, stem: Path) -> list[Path]:
 
 def plot_solution(solution: Solution, ax: Axes | None = None, panel: str = "gait") -> Any:
     if ax is not None:
-        gait = Panel(COLUMN, COLUMN, lambda axes: draw_gait(axes, solution))
-        return _draw_panel(ax, {"gait": gait, **panels(solution)}, panel)
+        named = {name: each.draw for name, each in panels(solution).items()}
+        return _plot({"gait": lambda axes: draw_gait(axes, solution), **named}, ax, panel)
     problem, solved = solution.problem, solution.status == SOLVED
     more = [text for text in (problem.scene, solution.turning) if text]
     headline = (
@@ -281,10 +297,8 @@ def draw_gait(axes: Axes, solution: Solution) -> None:
 
 
 def _draw_angles(axes: Axes, solution: Solution) -> None:
-    names = solution.problem.body.defaults
-    _draw_series(axes, _T, solution.gait.angles(_T))
-    axes.set(xlim=(0, 1), xlabel="phase t", ylabel=f"{names.quantity}  [rad]")
-    _draw_key(axes, names.coordinate)
+    names, angles = solution.problem.body.defaults, solution.gait.angles(_T)
+    _draw_series(axes, _T, angles, names.coordinate, ylabel=f"{names.quantity}  [rad]")
 
 
 def forbidden(
@@ -342,12 +356,10 @@ def _draw_speeds(axes: Axes, solution: Solution) -> None:
     motion, delta = solution.sample(_T), solution.delta_per_period
     part, speed = part_speeds(solution.problem.body, motion)
     speed = np.maximum(speed, 0.1 * delta)
-    _draw_series(axes, _T, speed)
+    _draw_series(axes, _T, speed, part, ylabel=f"{part} speed  [1/period]")
     axes.axhline(delta, color=GREY, lw=1, ls=":")
     axes.annotate("δ", (1.0, delta), (3, 0), textcoords="offset points", color=GREY, va="center")
-    axes.set(xlim=(0, 1), ylabel=f"{part} speed  [1/period]", xlabel="phase t")
     _set_log(axes, "y", (0.5 * float(min(speed.min(), delta)), 2 * float(speed.max())))
-    _draw_key(axes, part)
 
 
 def _draw_power(axes: Axes, solution: Solution) -> None:
@@ -392,28 +404,22 @@ def _draw_mesh(axes: Axes, solution: Solution) -> None:
 
 
 def plot_front(front: ParetoFront, ax: Axes | None = None) -> Any:
-    """Both objectives of every gait, joined but for gaps; in a figure of its own also the paths of
-    the gaits in the plane of the first two joints."""
-    if ax is not None:
-        return _draw_panel(
-            ax, {"": Panel(COLUMN, COLUMN, lambda axes: _draw_front(axes, front))}, ""
-        )
-    planar = front.problem.body.n_joint > 1
-    with styled():
-        figure = Figure(figsize=(7.2 if planar else 3.8, 3.4))
-        axes, *plane = figure.subplots(1, 1 + planar, squeeze=False)[0]
-        _draw_front(axes, front)
-        last = front.points[-1].gait.angles(_T)
-        for panel in plane:
-            colours = snapshot_colours(len(front.points))
-            for point, colour in zip(front.points, colours, strict=True):
-                path = point.gait.angles(_T)
-                # a mirror image is the same gait
-                mirror = np.abs(path + last).sum() < np.abs(path - last).sum()
-                panel.plot(*(-path if mirror else path)[:2], color=colour, lw=1.0)
-            what = front.problem.body.defaults.quantity
-            panel.set(xlabel=f"{what} 1  [rad]", ylabel=f"{what} 2  [rad]", aspect="equal")
-    return figure
+    """Both objectives of every gait; in a figure of its own also the paths of the gaits in the
+    plane of the first two joints."""
+    drawn: dict[str, Callable[[Axes], object]] = {"front": lambda axes: _draw_front(axes, front)}
+    if front.problem.body.n_joint > 1:
+        drawn["gaits"] = lambda axes: _draw_gaits(axes, front)
+    return _plot(drawn, ax, "front", (7.2 if len(drawn) > 1 else 3.8, 3.4))
+
+
+def _draw_gaits(axes: Axes, front: ParetoFront) -> None:
+    last, what = front.points[-1].gait.angles(_T), front.problem.body.defaults.quantity
+    for point, colour in zip(front.points, snapshot_colours(len(front.points)), strict=True):
+        path = point.gait.angles(_T)
+        # a mirror image is the same gait
+        mirror = np.abs(path + last).sum() < np.abs(path - last).sum()
+        axes.plot(*(-path if mirror else path)[:2], color=colour, lw=1.0)
+    axes.set(xlabel=f"{what} 1  [rad]", ylabel=f"{what} 2  [rad]", aspect="equal")
 
 
 def _draw_front(axes: Axes, front: ParetoFront) -> None:
@@ -434,16 +440,10 @@ def _draw_front(axes: Axes, front: ParetoFront) -> None:
 
 def plot_steering(family: Steering, ax: Axes | None = None, panel: str = "cost") -> Any:
     drawn = {
-        "cost": Panel(COLUMN, COLUMN, lambda axes: _draw_cost(axes, family)),
-        "tracks": Panel(COLUMN, COLUMN, lambda axes: _draw_tracks(axes, family)),
+        "cost": lambda axes: _draw_cost(axes, family),
+        "tracks": lambda axes: _draw_tracks(axes, family),
     }
-    if ax is not None:
-        return _draw_panel(ax, drawn, panel)
-    with styled():
-        figure = Figure(figsize=(7.2, 3.4))
-        for axes, each in zip(figure.subplots(1, 2), drawn.values(), strict=True):
-            each.draw(axes)
-    return figure
+    return _plot(drawn, ax, panel, (7.2, 3.4))
 
 
 def _draw_cost(axes: Axes, family: Steering) -> None:
@@ -478,29 +478,17 @@ def _draw_tracks(axes: Axes, family: Steering) -> None:
 
 
 def robot_panels(robot: Robot) -> dict[str, Panel]:
-    def draw(axes: Axes, what: str, unit: str) -> None:
-        t = robot.columns["t"].values
-        _draw_series(axes, t, robot.columns[f"joint_{what}s"].values)
-        axes.set(xlim=(0, t[-1]), xlabel="time  [s],  one period", ylabel=f"{what}  [{unit}]")
-        _draw_key(axes, "joint")
-
     def panel(what: str, unit: str) -> Panel:
-        return Panel(COLUMN, 2.2, lambda axes: draw(axes, what, unit))
+        t, rows = robot.columns["t"].values, robot.columns[f"joint_{what}s"].values
+        labels = {"xlabel": "time  [s],  one period", "ylabel": f"{what}  [{unit}]"}
+        return Panel(COLUMN, 2.2, lambda axes: _draw_series(axes, t, rows, "joint", **labels))
 
     return {what: panel(what, unit) for what, unit in _QUANTITIES.items()}
 
 
 def plot_robot(robot: Robot, ax: Axes | None = None, panel: str = "torque") -> Any:
-    drawn = robot_panels(robot)
-    if ax is not None:
-        return _draw_panel(ax, drawn, panel)
-    with styled():
-        figure = Picture(figsize=(6.4, 6.4))
-        rows = figure.subplots(len(drawn), sharex=True)
-        for axes, each in zip(rows, drawn.values(), strict=True):
-            each.draw(axes)
-            axes.label_outer()
-    return figure
+    drawn = {name: each.draw for name, each in robot_panels(robot).items()}
+    return _plot(drawn, ax, panel, (6.4, 6.4), stacked=True)
 
 
 def _draw_mesh_ticks(axes: Axes, edges: np.ndarray) -> None:
@@ -517,7 +505,9 @@ def _set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
     axis.set_major_formatter(lambda value, _: f"10{f'{np.log10(value):.0f}'.translate(_EXPONENT)}")
 
 
-def _draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
+def _draw_series(
+    axes: Axes, t: np.ndarray, rows: np.ndarray, of: str, *, ylabel: str, xlabel: str = "phase t"
+) -> None:
     """A line for every joint or part; many are coloured from dark to light, and a few named."""
     count = len(rows)
     many = count > len(SERIES)
@@ -525,6 +515,8 @@ def _draw_series(axes: Axes, t: np.ndarray, rows: np.ndarray) -> None:
     named = np.linspace(0, count - 1, _NAMED).round() if many else range(count)
     for j, row in enumerate(rows):
         axes.plot(t, row, lw=1.4, color=colours[j], label=f"{j + 1}" if j in named else None)
+    axes.set(xlim=(0, t[-1]), xlabel=xlabel, ylabel=ylabel)
+    _draw_key(axes, of)
 
 
 def _draw_key(axes: Axes, of: str = "", more: Mapping[str, Any] | None = None) -> None:

@@ -23,7 +23,7 @@ from colloc.mechanics.inertia import GRAVITY, checked_mass, momenta, tail_veloci
 from colloc.mechanics.law import rate_independent
 from colloc.results.motion import Column, SampledMotion, arc, motion_dataset, rotate
 from colloc.results.solution import Solution, direction_of_travel
-from colloc.system.arguments import check_finite
+from colloc.system.arguments import is_number, shown
 from colloc.system.environment import higher
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.trajectory import one_each, shortest_period
@@ -141,11 +141,10 @@ class Robot:
 
     def __post_init__(self) -> None:
         for name in ("length", "mass", "period", "gravity"):
-            check_finite(positive=True, **{name: (value := getattr(self, name))})
-            if not 1 / _LARGEST <= value <= _LARGEST:
+            if not (is_number(value := getattr(self, name)) and 1 / _LARGEST <= value <= _LARGEST):
                 raise ProblemError(
-                    f"{name} must lie between {1 / _LARGEST:g} and {_LARGEST:g} in SI units, not "
-                    f"{value:g}."
+                    f"{name} must be a number from {1 / _LARGEST:g} to {_LARGEST:g} in SI units, "
+                    f"not {shown(value)}."
                 )
         problem, froude = self.solution.problem, self.solution.froude
         if froude and abs(self.froude / froude - 1.0) > _SAME_PACE:

@@ -30,7 +30,7 @@ from colloc.search.options import OPTIONS
 from colloc.search.spaces import SPACES, space_of
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.interruption import interruptible, time_limit
-from colloc.system.plain_values import Codec, Encoding
+from colloc.system.plain_values import Codec
 from colloc.system.row_file import put_rows, read_rows
 
 Arguments = ParamSpec("Arguments")
@@ -113,8 +113,8 @@ class Run:
             return
         self._stated = self.problem.to_dict()
         records = [Answer, Certificate, Check, Iterate, SecondOrder, Step]
-        by_rule: dict[type, Encoding] = {Problem: Encoding(self._changes, self._with_changes)}
-        by_rule |= dict.fromkeys(SPACES, Encoding(self._space_arguments, self._space))
+        by_rule: dict[type, Any] = {Problem: (self._changes, self._with_changes)}
+        by_rule |= dict.fromkeys(SPACES, (self._space_arguments, self._space))
         self._codec = Codec([*records, *gait_fields.GAITS, *gait_fields.CLASSES], by_rule)
         if self.path is None:
             return

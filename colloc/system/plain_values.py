@@ -8,21 +8,17 @@ from __future__ import annotations
 
 import base64
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
 
-class Encoding(NamedTuple):
-    """Encoder and decoder of a class whose fields are not what should be stored."""
-
-    encode: Callable[[Any], Any]
-    decode: Callable[[Any], Any]
-
-
 class Codec:
-    def __init__(self, kinds: Iterable[type], own: Mapping[type, Encoding] | None = None) -> None:
+    """Encoder and decoder of values of listed classes; those of `own` are stored by an encoder and
+    a decoder of their own."""
+
+    def __init__(self, kinds: Iterable[type], own: Mapping[type, Any] | None = None) -> None:
         self._kinds = {kind.__name__: kind for kind in kinds}
         self._own = {kind.__name__: how for kind, how in (own or {}).items()}
 
@@ -39,7 +35,7 @@ class Codec:
             text = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode()
             return {"array": text, "type": value.dtype.str, "shape": list(value.shape)}
         if name in self._own:
-            of = self._own[name].encode(value)
+            of = self._own[name][0](value)
         elif name in self._kinds:
             names = getattr(value, "_fields", None) or [x.name for x in dataclasses.fields(value)]
             of = {each: self.encode(getattr(value, each)) for each in names}
@@ -66,7 +62,7 @@ class Codec:
         if name == "dict":
             return {self.decode(k): self.decode(v) for k, v in of}
         if name in self._own:
-            return self._own[name].decode(of)
+            return self._own[name][1](of)
         kind, values = self._kinds[name], {key: self.decode(part) for key, part in of.items()}
         if issubclass(kind, tuple):
             return kind(**values)

@@ -85,10 +85,8 @@ def test_a_model_has_the_energy_and_the_centre_of_mass_of_the_robot(write, links
     place, heading, joint, spin = 0j, 0.0, size * complex(*z[:2, 0]), float(z[2, 0])
     energy, moment, turns = 0.0, 0j, zip([0.0, *angles[:, 0]], [0.0, *rates[:, 0]], strict=True)
     for (ahead, middle, mass, inertia), (angle, rate) in zip(links(root), turns, strict=True):
-        place, joint = (
-            place + ahead * np.exp(1j * heading),
-            joint + 1j * spin * ahead * np.exp(1j * heading),
-        )
+        along = ahead * np.exp(1j * heading)
+        place, joint = place + along, joint + 1j * spin * along
         heading, spin = heading + angle, spin + rate
         arm = middle * np.exp(1j * heading)
         energy += 0.5 * mass * abs(joint + 1j * spin * arm) ** 2 + 0.5 * inertia * spin**2
@@ -100,27 +98,15 @@ def test_a_model_has_the_energy_and_the_centre_of_mass_of_the_robot(write, links
 
 
 def test_every_contact_has_the_coefficients_of_its_own_foot_along_and_across(uneven, tmp_path):
-    feet = (
-        Foot(0),
-        Foot(1, friction=Friction(mu_t=3, mu_f=4, mu_b=1)),
-        Wheel(2, rolling=0.04, sideways=1.0),
-    )
-    problem = uneven.problem.with_(
-        body=Chain(feet=feet), friction=Friction(9, 9, 9), joint_limit=3.0
-    )
+    directed = Foot(1, friction=Friction(mu_t=3, mu_f=4, mu_b=1))
+    body = Chain(feet=(Foot(0), directed, Wheel(2, rolling=0.04, sideways=1.0)))
+    problem = uneven.problem.with_(body=body, friction=Friction(9, 9, 9), joint_limit=3.0)
     solution = colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
     root = ElementTree.fromstring(mjcf(solution.robot(**SIZE)))
-    assert [pair.get("geom2") for pair in root.iter("pair")] == ["foot_1", "foot_2", "foot_3"]
-    assert [numbers(pair.get("friction"))[:2] for pair in root.iter("pair")] == [
-        [9, 9],
-        [2, 3],
-        [0.04, 1],
-    ]
-    said = solution.export(tmp_path / "x.xml", **SIZE)["note"]
-    assert (
-        "is elliptic, and alike forwards and backwards: friction (3, 4, 1) is elliptic friction "
-        "(3, 2, 2), fric" in said
-    )
+    pairs = {x.get("geom2"): numbers(x.get("friction"))[:2] for x in root.iter("pair")}
+    assert pairs == {"foot_1": [9, 9], "foot_2": [2, 3], "foot_3": [0.04, 1]}
+    note = "friction (3, 4, 1) is elliptic friction (3, 2, 2), fric"
+    assert f"and backwards: {note}" in solution.export(tmp_path / "x.xml", **SIZE)["note"]
     assert "nothing of friction" in solution.export(tmp_path / "x.urdf", **SIZE)["note"]
     stated = solution.export(tmp_path / "x.csv", period=4.0)["friction"]
     assert [law["mu_t"] for law in stated["laws"]] == [9, 3, 1]
