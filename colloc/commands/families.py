@@ -9,7 +9,7 @@ import json
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -23,6 +23,7 @@ from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
 from colloc.results.distinct_optima import Basin, basins
+from colloc.results.kept import save_result
 from colloc.results.outcome import STATUSES, Outcome, counts
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import ProblemError, StoreError
@@ -303,36 +304,47 @@ def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]
     return facts, lines + failed
 
 
-def _save_family(
+def _family(
     options: argparse.Namespace,
-    family: ParetoFront | Steering,
-    table: Path,
-    members: Iterable[tuple[str, Solution]],
-    source: str,
-    describe: Callable[[list[Path]], tuple[str, dict[str, Any], list[str], str]],
+    ending: str,
+    find: Callable[[Problem, int, Callable[[str], None]], Any],
+    describe: Callable[[Any, dict[Path, Solution]], tuple[str, dict[str, Any], list[str]]],
 ) -> int:
-    """Save the members and the table of a family, draw and print it, and return the exit code.
+    """Find a family, save its members and its table, draw and print it; the exit code.
 
-    From the paths of the members, `describe` gives the text of the table, facts, lines for people
-    and how members are named among the saved files.
+    `find` is called with the problem, the number of starts and what shows progress. From the
+    family and its members by their paths `describe` gives the text of the table, facts, and lines
+    for people.
     """
-    from colloc.results.kept import save_result
+    stated, problem = cli.read_problem(options)
+    table = cli.output_path(options, Path("results") / f"{problem.name}.{ending}")
+    from colloc.search.options import OPTIONS
+    from colloc.studies.solve import checkpoints_in
 
-    paths, saved = [], []
-    for name, solution in members:
-        solution.source = source
-        saved += (one := save_result(solution, table.with_suffix("") / f"{name}.h5"))
-        paths.append(one[0].path)
-    content, facts, lines, points = describe(paths)
-    write_text(table, content)
-    files = [table]
-    if not options.no_figure:
-        from colloc.pictures.style import save as save_figure
+    starts = options.starts or stated.starts or OPTIONS.starts
+    members, saved = dict[Path, Solution](), []
+    with checkpoints_in(table.with_suffix("")):
+        with cli.status_line(options) as line:
+            family = find(problem, starts, lambda text: line.say(f"{problem.name}: {text}"))
+        named = {f"{k:02d}": point for k, point in enumerate(family.points)}
+        if spot := getattr(family, "on_the_spot", None):
+            named |= {f"spot_{k:02d}": point for k, point in enumerate(spot.points)}
+        for name, solution in named.items():
+            solution.source = stated.source
+            saved += (one := save_result(solution, table.with_suffix("") / f"{name}.h5"))
+            members[one[0].path] = solution
+        content, facts, lines = describe(family, members)
+        write_text(table, content)
+        points = f", {next(iter(members))} ..."
+        files = [table]
+        if not options.no_figure:
+            from colloc.pictures.style import save as save_figure
 
-        with naming_saved_files([f"{table}{points}"]):
-            files += save_figure(family.plot(), table.with_suffix(""), ("png",))
-    lines = [*lines, f"  saved {', '.join(map(str, files))}{points}", *kept_lines(saved)]
-    cli.tell(options, facts | {"kept": kept_facts(saved)}, lines)
+            with naming_saved_files([f"{table}{points}"]):
+                files += save_figure(family.plot(), table.with_suffix(""), ("png",))
+        last = f"  saved {', '.join(map(str, files))}{points}"
+        lines = [f"{problem.name}: {lines[0]}", *lines[1:], last, *kept_lines(saved)]
+        cli.tell(options, facts | {"file": str(table), "kept": kept_facts(saved)}, lines)
     return OK if family.certified else FAILED
 
 
@@ -353,50 +365,41 @@ the last one the best by the second. Exit code 4: a gap is left where gaits are 
     cli.NO_FIGURE,
 )
 def pareto(options: argparse.Namespace) -> int:
-    stated, problem = cli.read_problem(options)
     first, second = aims = [objective_from(text) for text in options.objectives]
-    table = cli.output_path(options, Path("results") / f"{problem.name}.front.csv")
-    from colloc.search.options import OPTIONS
-    from colloc.studies.families import pareto_front
-    from colloc.studies.solve import checkpoints_in
 
-    with checkpoints_in(table.with_suffix("")):
-        with cli.status_line(options) as line:
-            line.say(f"{problem.name}: the ends of the front")
+    def find(problem: Problem, starts: int, say: Callable[[str], None]) -> ParetoFront:
+        from colloc.studies.families import pareto_front
 
-            def report(k: int, point: Solution) -> None:
-                last = options.points - 1
-                what = f"point {k} of {last}" if k <= last else "in a gap"
-                line.say(f"{problem.name}: {what}: {point}")
+        def report(k: int, point: Solution) -> None:
+            last = options.points - 1
+            say(f"{f'point {k} of {last}' if k <= last else 'in a gap'}: {point}")
 
-            starts = options.starts or stated.starts or OPTIONS.starts
-            front = pareto_front(
-                problem, first, second, options.points, starts=starts, progress=report
-            )
+        say("the ends of the front")
+        return pareto_front(problem, first, second, options.points, starts=starts, progress=report)
 
-        def describe(paths: list[Path]) -> tuple[str, dict[str, Any], list[str], str]:
-            names = ["point", *(x.expression for x in aims), "distance", "work", "status", "file"]
-            rows = [
-                [k, *both, point.measured.distance, point.measured.work, point.status, str(path)]
-                for k, (point, both, path) in enumerate(
-                    zip(front.points, front.values.tolist(), paths, strict=True)
-                )
-            ]
-            content = io.StringIO(newline="")
-            csv.writer(content).writerows([names, *rows])
-            empty = {gap.after: f"\n       nothing found between: {gap.why}" for gap in front.gaps}
-            facts = {
-                "objectives": [aim.fields() for aim in aims],
-                "points": [dict(zip(names, row, strict=True)) for row in rows],
-                "gaps": [asdict(gap) for gap in front.gaps],
-            }
-            lines = [f"{problem.name}: {first.name} against {second.name}, {len(rows)} points"]
-            for k, a, b, _, _, status, _ in rows:
-                lines.append(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}{empty.get(k, '')}")
-            return content.getvalue(), facts, lines, f", {paths[0]} ..."
+    def describe(
+        front: ParetoFront, members: dict[Path, Solution]
+    ) -> tuple[str, dict[str, Any], list[str]]:
+        names = ["point", *(x.expression for x in aims), "distance", "work", "status", "file"]
+        every = zip(members.items(), front.values.tolist(), strict=True)
+        rows = [
+            [k, *both, point.measured.distance, point.measured.work, point.status, str(path)]
+            for k, ((path, point), both) in enumerate(every)
+        ]
+        content = io.StringIO(newline="")
+        csv.writer(content).writerows([names, *rows])
+        empty = {gap.after: f"\n       nothing found between: {gap.why}" for gap in front.gaps}
+        facts = {
+            "objectives": [aim.fields() for aim in aims],
+            "points": [dict(zip(names, row, strict=True)) for row in rows],
+            "gaps": [asdict(gap) for gap in front.gaps],
+        }
+        lines = [f"{first.name} against {second.name}, {len(rows)} points"]
+        for k, a, b, _, _, status, _ in rows:
+            lines.append(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}{empty.get(k, '')}")
+        return content.getvalue(), facts, lines
 
-        members = [(f"{k:02d}", point) for k, point in enumerate(front.points)]
-        return _save_family(options, front, table, members, stated.source, describe)
+    return _family(options, "front.csv", find, describe)
 
 
 @cli.command(
@@ -423,37 +426,30 @@ def steer(options: argparse.Namespace) -> int:
             "--turn and --spot take degrees between -180 and 180, --spot not 0: by more a body "
             "could turn the other way."
         )
-    stated, problem = cli.read_problem(options)
-    table = cli.output_path(options, Path("results") / f"{problem.name}.steer.json")
-    from colloc.search.options import OPTIONS
-    from colloc.studies.families import steer as steer_problem
-    from colloc.studies.solve import checkpoints_in
 
-    with checkpoints_in(table.with_suffix("")):
-        with cli.status_line(options) as line:
-            line.say(f"{problem.name}: the straight gait")
+    def find(problem: Problem, starts: int, say: Callable[[str], None]) -> Steering:
+        from colloc.studies.families import steer as find_gaits
 
-            def report(turn: float, point: Solution) -> None:
-                line.say(f"{problem.name}: {math.degrees(turn):+.4g} degrees a period: {point}")
+        def report(turn: float, point: Solution) -> None:
+            say(f"{math.degrees(turn):+.4g} degrees a period: {point}")
 
-            turns, spot = ([*map(math.radians, each)] for each in (options.turn, options.spot))
-            starts = options.starts or stated.starts or OPTIONS.starts
-            family = steer_problem(problem, turns, spot=spot, starts=starts, progress=report)
-        spots = () if family.on_the_spot is None else family.on_the_spot.points
-        members = [(f"{k:02d}", point) for k, point in enumerate(family.points)]
-        members += [(f"spot_{k:02d}", point) for k, point in enumerate(spots)]
+        say("the straight gait")
+        turns, spot = ([*map(math.radians, each)] for each in (options.turn, options.spot))
+        return find_gaits(problem, turns, spot=spot, starts=starts, progress=report)
 
-        def describe(paths: list[Path]) -> tuple[str, dict[str, Any], list[str], str]:
-            lines = [f"{problem.name}: {len(members)} gaits that steer"]
-            for (_, point), path in zip(members, paths, strict=True):
-                arc = point.arc
-                radius = f"{arc.radius:8.4f}" if math.isfinite(arc.radius) else "       -"
-                lines.append(
-                    f"  {math.degrees(arc.angle):+7.2f}°  radius {radius}  chord {arc.chord:.6f}  "
-                    f"work {point.work:.6f}  efficiency {arc.chord / point.work:.6f}  "
-                    f"{point.status}  {path}"
-                )
-            facts = family.table() | {"efficiency": family.efficiency.tolist()}
-            return json.dumps(facts) + "\n", facts | {"file": str(table)}, lines, ""
+    def describe(
+        family: Steering, members: dict[Path, Solution]
+    ) -> tuple[str, dict[str, Any], list[str]]:
+        lines = [f"{len(members)} gaits that steer"]
+        for path, point in members.items():
+            arc = point.arc
+            radius = f"{arc.radius:8.4f}" if math.isfinite(arc.radius) else "       -"
+            lines.append(
+                f"  {math.degrees(arc.angle):+7.2f}°  radius {radius}  chord {arc.chord:.6f}  "
+                f"work {point.work:.6f}  efficiency {arc.chord / point.work:.6f}  "
+                f"{point.status}  {path}"
+            )
+        facts = family.table() | {"efficiency": family.efficiency.tolist()}
+        return json.dumps(facts) + "\n", facts, lines
 
-        return _save_family(options, family, table, members, stated.source, describe)
+    return _family(options, "steer.json", find, describe)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,13 +22,13 @@ from colloc.gaits.regime import Free
 from colloc.mechanics.chain import Chain
 from colloc.results import limit_use
 from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED
+from colloc.results.kept import Saved, save_result
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
-from colloc.system.errors import CollocError, NotConvergedError, ProblemError, StoreError
+from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 from colloc.system.progress import duration
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
-    from colloc.results.kept import Saved
 
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
 _MANY_INTERVALS, _SECONDS_PER_INTERVAL = 1000, 0.02
@@ -140,8 +140,6 @@ def init(options: argparse.Namespace) -> int:
 
 def save_and_tell(options: argparse.Namespace, solution: Solution, path: Path) -> int:
     """Save a solution and print its summary; returns the exit code."""
-    from colloc.results.kept import save_result
-
     saved = save_result(solution, path)
     facts = {**summary_dict(solution, saved[0].path, None, None), "kept": kept_facts(saved)}
     lines = summary_lines(solution, None, verbose=options.verbose)
@@ -328,6 +326,15 @@ def solve(options: argparse.Namespace) -> int:
     from colloc.bounds.optimality_gap import gap_line, upper_bound
     from colloc.studies.solve import resume, save_and_clear
 
+    complaints: list[str] = []
+
+    @contextmanager
+    def complaining(what: str) -> Iterator[None]:
+        try:
+            yield
+        except CollocError as error:  # what is solved is not lost for it
+            complaints.append(f"{what}: {error}")
+
     if not cli.quiet(options) and problem.intervals > _MANY_INTERVALS:
         seconds = duration(_SECONDS_PER_INTERVAL * problem.intervals)
         cli.complain(
@@ -343,48 +350,37 @@ def solve(options: argparse.Namespace) -> int:
             progress=lambda news: line.say(f"{problem.name}: {news}"),
             **cli.values(options, "seconds", "search", "fresh"),
         )
-    bound, complaints, saved, records = None, [], [], []
+    bound, saved, records, ended = None, list[str](), list[Saved](), not solution.interrupted
     if options.dry and solution.certificate.replayed:
-        try:
+        with complaining("no bounds under dry friction"):
             solution.certify_dry()
-        except CollocError as error:  # what is solved is not lost for it
-            complaints.append(f"no bounds under dry friction: {error}")
-    try:
+    with complaining("the result is not saved"):
         records = save_and_clear(solution, path)
         path = records[0].path
         saved = [str(path), *(f"{one.path} (the gait that shrank)" for one in records[1:])]
-    except StoreError as error:  # the result is printed all the same
-        complaints.append(f"the result is not saved: {error}")
     with naming_saved_files(saved):
-        with cli.status_line(options) as line:
+        with cli.status_line(options) as line, complaining("no bound"):
             if options.bound:
                 line.say("computing an upper bound on every gait")
-            try:
-                compute = options.bound and not solution.interrupted
-                bound = upper_bound(problem, path.parent, compute=compute)
-            except CollocError as error:
-                complaints.append(f"no bound: {error}")
+            bound = upper_bound(problem, path.parent, compute=options.bound and ended)
         facts = summary_dict(solution, path if saved else None, stated.reference, bound)
         lines = summary_lines(solution, stated.reference, verbose=options.verbose)
         gap = gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)
         cli.tell(options, facts | {"kept": kept_facts(records)}, [*lines, gap])
-        if saved and not options.no_figure and not solution.interrupted:
+        if saved and not options.no_figure and ended:
             from colloc.pictures.style import save as save_figure
 
-            with cli.status_line(options) as line:
+            with cli.status_line(options) as line, complaining("no figure"):
                 line.say("drawing")
-                try:
-                    figure, kinds = solution.plot(), ("png", "pdf")[: 1 + options.pdf]
-                    saved += map(str, save_figure(figure, path.with_suffix(""), kinds))
-                except CollocError as error:
-                    complaints.append(f"no figure: {error}")
+                figure, kinds = solution.plot(), ("png", "pdf")[: 1 + options.pdf]
+                saved += map(str, save_figure(figure, path.with_suffix(""), kinds))
     if saved and not options.json:
         print("\n".join([f"  saved {', '.join(saved)}", *kept_lines(records)]))
-    if solution.interrupted:
+    if not ended:
         complaints.append("interrupted; the same command goes on from there.")
     for complaint in complaints:
         cli.complain(complaint)
-    return BAD_PROBLEM if complaints and not solution.interrupted else EXIT[solution.status]
+    return BAD_PROBLEM if complaints and ended else EXIT[solution.status]
 
 
 @cli.command(

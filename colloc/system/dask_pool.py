@@ -49,21 +49,18 @@ def connect(
     except TimeoutError:
         client.close()
         raise ProblemError(
-            f"{_without_workers(address, patience)}, for example: dask worker ADDRESS --nthreads 1."
+            f"the Dask scheduler at {address} had no workers for {patience:.0f} s; start some, for "
+            f"example: dask worker ADDRESS --nthreads 1."
         ) from None
     count = max(1, sum(client.nthreads().values()))
     return lambda _: _DaskExecutor(client, address, patience), count
-
-
-def _without_workers(address: str, patience: float) -> str:
-    return f"the Dask scheduler at {address} had no workers for {patience:.0f} s; start some"
 
 
 class _DaskExecutor(Executor):
     def __init__(self, client: Any, address: str, patience: float) -> None:
         self._client, self._address, self._patience = client, address, patience
         self._pool = client.get_executor(pure=False)
-        self._looked = self._heard = self._worked = time.monotonic()
+        self._looked = self._well = time.monotonic()
 
     def submit(self, function: Callable, /, *arguments: Any, **named: Any) -> Future:
         try:
@@ -74,34 +71,26 @@ class _DaskExecutor(Executor):
 
     def check(self) -> None:
         """Raise `EngineGone` if the scheduler died, is silent, or has no workers."""
-        if self._client.status != "running":
-            raise EngineGone(
-                f"the Dask scheduler at {self._address} is gone; what is done is kept. Start it "
-                f"and give the command again."
-            )
-        pause = time.monotonic() - self._looked
-        if pause < _LOOK:
-            return
-        ask, timeout = self._client.scheduler.ncores, min(_ANSWER, self._patience)
-        try:
-            workers = len(self._client.sync(ask, callback_timeout=timeout))
-        except Exception:  # stopped, cut off, or about to die
-            workers = None
-        now = self._looked = time.monotonic()
-        if workers is not None or pause > _ANSWER:  # or nobody was waiting until now
-            self._heard = now
-        if workers != 0 or pause > _ANSWER:
-            self._worked = now
-        if now - self._heard > self._patience:
-            raise EngineGone(
-                f"the Dask scheduler at {self._address} gave no answer for {self._patience:.0f} s. "
-                "What is done is kept; look at the scheduler and the network, and give the same "
-                "command again."
-            )
-        if now - self._worked > self._patience:
-            raise EngineGone(
-                f"{_without_workers(self._address, self._patience)}. What is done is kept."
-            )
+        pause, trouble = time.monotonic() - self._looked, "is gone"
+        if self._client.status == "running":
+            if pause < _LOOK:
+                return
+            ask, timeout = self._client.scheduler.ncores, min(_ANSWER, self._patience)
+            try:
+                workers = len(self._client.sync(ask, callback_timeout=timeout))
+                trouble = "had no workers"
+            except Exception:  # stopped, cut off, or about to die
+                workers, trouble = 0, "gave no answer"
+            self._looked = time.monotonic()
+            if workers or pause > _ANSWER:  # or nobody was waiting until now
+                self._well = self._looked
+            if self._looked - self._well <= self._patience:
+                return
+            trouble += f" for {self._patience:.0f} s"
+        raise EngineGone(
+            f"the Dask scheduler at {self._address} {trouble}; what is done is kept. Look at it, "
+            f"its workers and the network, and give the same command again."
+        )
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         with suppress(Exception):  # the client may be closed

@@ -13,13 +13,9 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from colloc.system.errors import CollocError, StoreError
+from colloc.system.errors import StoreError
 
 CACHE = "colloc cache 2"
-_UNREADABLE = (
-    *(sqlite3.Error, OSError, TypeError, ValueError, RecursionError),
-    *(KeyError, AttributeError, OverflowError, CollocError),
-)
 _PATIENCE = 60.0  # seconds to wait for other writers, each of which takes milliseconds
 
 
@@ -64,7 +60,7 @@ def read_rows(
             return {key: decode(json.loads(text)) for key, text in rows}
     except StoreError:
         raise
-    except _UNREADABLE as error:
+    except Exception as error:
         raise StoreError(
             f"{path} cannot be read as a {kind} ({error}); move it away, or have sqlite3 "
             f"recover it."
