@@ -14,7 +14,7 @@ from pathlib import Path
 
 from benchmarks.known import known, row_of, save_known, with_row
 from colloc.commands.ending import FAILED, OK, run
-from colloc.commands.main import PRINTING, flag, status_line, tell, text
+from colloc.commands.main import PRINTING, flag, option, status_line, tell
 from colloc.results.store import load
 from colloc.system.errors import CollocError, ProblemError
 from colloc.system.files import alone_in
@@ -38,11 +38,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     table = "another table than benchmarks/known.json; with --add (default: known.json) begun as a copy of that"
     for name, settings in (
-        text("--table", "FILE.json", table),
-        text("--only", "NAME", "rows of the problem of this name"),
+        option(str, "--table", "FILE.json", table),
+        option(str, "--only", "NAME", "rows of the problem of this name"),
         flag("--dry", "check bounds under dry friction as well"),
-        text("--add", "FILE.h5", "a result to take in"),
-        text("--by", "COMMAND", "with --add: the command that anyone can find it with"),
+        option(str, "--add", "FILE.h5", "a result to take in"),
+        option(str, "--by", "COMMAND", "with --add: the command that anyone can find it with"),
         *PRINTING,
     ):
         parser.add_argument(name, **settings)

@@ -47,6 +47,7 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
     codecs.register_error("colloc.words", _spell_out)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="colloc.words")
+    status, sentence, output_fails = "error", "", False
     try:
         with interruptible(polled=False), _short_warnings():
             try:
@@ -54,24 +55,30 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
                     code = command()
             finally:
                 sys.stdout.flush()
-        if code == INTERRUPTED:
-            _end_workers()
-        return code
     except CollocError as error:
-        return _end(BAD_PROBLEM, "error", str(error), as_json)
+        code, sentence = BAD_PROBLEM, str(error)
     except BrokenPipeError:
-        _discard_output()
+        code, as_json, output_fails = UNREAD, False, True
         sentence = "nobody reads the output any more; what was saved before is kept."
-        return _end(UNREAD, "unread", sentence, as_json=False)
     except OSError as error:
-        if error.filename is None:
-            _discard_output()
+        code, output_fails = BAD_PROBLEM, error.filename is None
         what = f"{error.filename or 'the output'}: {error.strerror or error}"
-        return _end(BAD_PROBLEM, "error", f"cannot read or write {what}.", as_json)
+        sentence = f"cannot read or write {what}."
     except KeyboardInterrupt as stop:
-        _end_workers()
+        code, status = INTERRUPTED, "interrupted"
         sentence = f"interrupted; {str(stop) or 'nothing was written.'}"
-        return _end(INTERRUPTED, "interrupted", sentence, as_json)
+    if code == INTERRUPTED and "multiprocessing" in sys.modules:
+        for child in sys.modules["multiprocessing"].active_children():  # Python would wait for them
+            child.terminate()
+    if output_fails:  # Python is not to try to print the rest as it ends
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if sentence and as_json:
+        with contextlib.suppress(OSError):
+            show(json.dumps({"status": status, "message": sentence, "exit_code": code}))
+    if sentence:
+        print(f"colloc: {sentence}", file=sys.stderr)
+    return code
 
 
 def show(text: str) -> None:
@@ -100,27 +107,6 @@ def naming_saved_files(saved: Sequence[str]) -> Iterator[None]:
     except KeyboardInterrupt as stop:
         what = f"{', '.join(saved)} {'are' if len(saved) > 1 else 'is'} saved." if saved else ""
         raise KeyboardInterrupt(str(stop) or what) from None
-
-
-def _end_workers() -> None:
-    """End child processes, for which Python would wait."""
-    if "multiprocessing" in sys.modules:
-        for child in sys.modules["multiprocessing"].active_children():
-            child.terminate()
-
-
-def _end(code: int, status: str, message: str, as_json: bool) -> int:
-    if as_json:
-        with contextlib.suppress(OSError):
-            show(json.dumps({"status": status, "message": message, "exit_code": code}))
-    print(f"colloc: {message}", file=sys.stderr)
-    return code
-
-
-def _discard_output() -> None:
-    """Have Python not try to print the rest as it ends."""
-    with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _spell_out(error: UnicodeError) -> tuple[str | bytes, int]:

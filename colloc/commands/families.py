@@ -15,6 +15,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from colloc.commands import main as cli
 from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK, naming_saved_files
 from colloc.commands.solve import bound_facts, kept_facts, kept_lines, save_and_tell
@@ -31,7 +33,8 @@ from colloc.system.files import SUFFIX, lock_file, write_text
 
 if TYPE_CHECKING:
     from colloc.studies.families import ParetoFront, Steering
-    from colloc.studies.sweep import StudyRun
+    from colloc.studies.study import Study
+    from colloc.studies.sweep import StudyTable
 
 _MOST_SHOWN = 12
 _SAVE_EVERY = 60.0  # seconds
@@ -89,14 +92,21 @@ start like any other, solved again from its gait (from its guess, if it had fail
   colloc multistart problems/three_link.py --starts 100 --workers 2
   colloc multistart results/three_link.starts.h5 --start 7     results/three_link.start-7.h5""",
     *cli.PROBLEM,
-    cli.count("--starts", "N", "starts 0 to N-1 (default: 20)", 20, least=1),
-    cli.count("--seed", "N", "of the sampler (default: 0)", 0, least=0),
+    cli.option(int, "--starts", "N", "starts 0 to N-1 (default: 20)", 20, least=1),
+    cli.option(int, "--seed", "N", "of the sampler (default: 0)", 0, least=0),
     cli.WORKERS,
-    cli.choice("--sampler", SAMPLERS, "perturbed: near the problem's guess", LATIN_HYPERCUBE),
-    cli.number("--time-limit", "S", "seconds for one start (default: 300)", 300.0, above=0),
+    cli.option(
+        str,
+        "--sampler",
+        None,
+        "perturbed: near the problem's guess",
+        LATIN_HYPERCUBE,
+        choices=SAMPLERS,
+    ),
+    cli.option(float, "--time-limit", "S", "seconds for one start (default: 300)", 300.0, least=0),
     cli.RETRY,
     cli.BOUND,
-    cli.count("--start", "N", "with an archive: the start to make a result of"),
+    cli.option(int, "--start", "N", "with an archive: the start to make a result of"),
     cli.VERBOSE,
     cli.output("folder, or .h5 file (default: results/NAME.starts.h5; beside an archive)"),
 )
@@ -191,12 +201,14 @@ def _open_archive(options: argparse.Namespace) -> int:
     """\
 Starts travel between neighbours. What is done is kept, and not solved again. A study file is Python
 code, and is executed. Exit code 3: some cells have no certified gait.""",
-    cli.text(
-        "study", None, "a Python file that states STUDY, for example studies/friction_plane.py"
+    cli.option(
+        str, "study", None, "a Python file that states STUDY, for example studies/friction_plane.py"
     ),
     cli.WORKERS,
-    cli.text("--dask", "ADDRESS", "scheduler of a Dask cluster (tcp://host:8786), or 'local'"),
-    cli.count("--chunk", "N", "cells to a task, instead of the study's own number", least=1),
+    cli.option(
+        str, "--dask", "ADDRESS", "scheduler of a Dask cluster (tcp://host:8786), or 'local'"
+    ),
+    cli.option(int, "--chunk", "N", "cells to a task, instead of the study's own number", least=1),
     cli.RETRY,
     cli.output("folder, or .nc file; NAME.study/ lies beside it (default: results/NAME.nc)"),
 )
@@ -216,11 +228,10 @@ def sweep(options: argparse.Namespace) -> int:
         known = upper_bound(problem, path.parent, compute=False)
         return None if known is None else known.sampled
 
-    def save() -> float:
-        begin = time.perf_counter()
+    def save() -> StudyTable:
         table = study_table(run, known_bound)
         save_study(table, path, source=source, command=options.command)
-        return time.perf_counter() - begin
+        return table
 
     folder, interrupted = path.with_suffix(".study"), False
     with lock_file(folder / "lock"):
@@ -233,53 +244,35 @@ def sweep(options: argparse.Namespace) -> int:
             from colloc.system.dask_pool import connect
 
             executor, workers = connect(options.dask, workers, cli.complain)
-        begin = time.perf_counter()
-        due, number = begin + _SAVE_EVERY, 0
+        due = time.perf_counter() + _SAVE_EVERY
         try:
             for news in run.run(workers=workers, executor=executor):
-                if news.round != number:
-                    number, begin = news.round, time.perf_counter()
                 if not cli.quiet(options):
-                    best = news.state.best
-                    value = f"{best.outcome.value:9.6f}" if best else "     none"
-                    tally = Counter(a.outcome.status for a in news.new)
-                    tries = ", ".join(f"{n} {status}" for status, n in tally.items())
-                    left = (time.perf_counter() - begin) / news.done * (news.total - news.done)
-                    print(
-                        f"{study.label(news.cell)}: {value}  ({tries}; round {number}: "
-                        f"{news.done} of {news.total}, {left:.0f} s left)",
-                        flush=True,
-                    )
-                if time.perf_counter() > due:
-                    due = time.perf_counter() + max(_SAVE_EVERY, 20 * save())
+                    print(news, flush=True)
+                if (begin := time.perf_counter()) > due:
+                    save()
+                    due = (end := time.perf_counter()) + max(_SAVE_EVERY, 20 * (end - begin))
         except KeyboardInterrupt:
             interrupted = True
         except BrokenExecutor as error:
             what = f"no worker could be started ({error}); what is done is kept."
             raise StoreError(what) from None
         finally:
-            save()
-    cli.tell(options, *sweep_summary(run, path))
+            table = save()
+    cli.tell(options, *sweep_summary(study, table, path))
     if interrupted:
         cli.complain("interrupted; what is done is kept, and the same command goes on from there.")
         return INTERRUPTED
-    return OK if all(run.state(cell).best for cell in study.cells()) else NONE_FOUND
+    return OK if (table.variables["status"] == SOLVED).all() else NONE_FOUND
 
 
-def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]:
+def sweep_summary(study: Study, table: StudyTable, path: Path) -> tuple[dict[str, Any], list[str]]:
     """Facts about a study at its end, and lines for people."""
-    study, cells = run.study, dict(run.cells)
-    total = math.prod(study.shape)
-    tally: Counter[str] = Counter()
-    failed = []
-    for cell, state in cells.items():
-        tried = "no certified gait" if state.attempts else "not tried yet"
-        tally["solved" if state.best else tried if state.problem else "no problem"] += 1
-        why = state.attempts[-1].outcome.message if state.attempts else state.message
-        if not state.best and (state.attempts or why):
-            failed.append(f"  {study.label(cell)}: {why}")
-    tally += Counter({"not tried yet": total - len(cells)})
-    below = [cell for cell in cells if run.below_neighbour(cell)]
+    columns, total = table.variables, math.prod(study.shape)
+    words = {SOLVED: SOLVED, "not tried": "not tried yet", "no problem": "no problem"}
+    status = columns["status"]
+    tally = Counter(words.get(each, "no certified gait") for each in status.flat)
+    below = [*map(tuple, np.argwhere(columns["below_neighbour"]).tolist())]
     facts = {
         "name": study.name,
         "file": str(path),
@@ -295,13 +288,14 @@ def sweep_summary(run: StudyRun, path: Path) -> tuple[dict[str, Any], list[str]]
             f"starts may find more"
         )
     for cell in below[:_MOST_SHOWN]:
-        best, could = cells[cell].best, run.neighbour_value(cell)
-        assert best is not None
-        value = f"{best.outcome.value:.6f}, where a neighbour's gait achieves {could:.6f}"
-        lines.append(f"  {study.label(cell)}: {value}")
+        value, could = columns["value"][cell], columns["neighbour_value"][cell]
+        what = f"{value:.6f}, where a neighbour's gait achieves {could:.6f}"
+        lines.append(f"  {study.label(cell)}: {what}")
+    failed = [cell for cell in study.cells() if status[cell] not in (SOLVED, "not tried")]
+    lines += [f"  {study.label(c)}: {columns['message'][c]}" for c in failed[:_MOST_SHOWN]]
     if more := len(failed[_MOST_SHOWN:]):
-        failed[_MOST_SHOWN:] = [f"  ... and {more} more; all are in the file, with their messages"]
-    return facts, lines + failed
+        lines.append(f"  ... and {more} more; all are in the file, with their messages")
+    return facts, lines
 
 
 def _family(
@@ -356,11 +350,16 @@ the last one the best by the second. Exit code 4: a gap is left where gaits are 
 
   colloc pareto mine.py --objectives distance "distance / work" --points 15""",
     *cli.PROBLEM,
-    cli.text(
-        "--objectives", ("FIRST", "SECOND"), f"default: {' '.join(_AIMS)}", nargs=2, default=_AIMS
+    cli.option(
+        str,
+        "--objectives",
+        ("FIRST", "SECOND"),
+        f"default: {' '.join(_AIMS)}",
+        nargs=2,
+        default=_AIMS,
     ),
-    cli.count("--points", "N", "of the front, without duplicates (default: 9)", 9, least=2),
-    cli.count("--starts", "N", "starting points for both ends (default: 32)", least=1),
+    cli.option(int, "--points", "N", "of the front, without duplicates (default: 9)", 9, least=2),
+    cli.option(int, "--starts", "N", "starting points for both ends (default: 32)", least=1),
     cli.output("folder, or .csv file (default: results/NAME.front.csv)"),
     cli.NO_FIGURE,
 )
@@ -411,12 +410,12 @@ of a period.
 
   colloc steer mine.py --turn -40 -20 -10 0 10 20 40 --spot -30 30""",
     *cli.PROBLEM,
-    cli.number(
+    cli.option(float,
         "--turn", "DEG", "per period (default: -30 -15 0 15 30)", [-30.0, -15.0, 0.0, 15.0, 30.0],
         nargs="+",
     ),
-    cli.number("--spot", "DEG", "turns on the spot, with the least work", [], nargs="+"),
-    cli.count("--starts", "N", "starting points for the straight gait (default: 32)", least=1),
+    cli.option(float, "--spot", "DEG", "turns on the spot, with the least work", [], nargs="+"),
+    cli.option(int, "--starts", "N", "starts for the straight gait (default: 32)", least=1),
     cli.output("folder, or .json file (default: results/NAME.steer.json)"),
     cli.NO_FIGURE,
 )  # fmt: skip

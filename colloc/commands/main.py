@@ -134,12 +134,16 @@ def command(epilog: str, *options: Option) -> Callable[[Function], Callable[...,
     return register
 
 
-def text(name: str, metavar: Any, help: str, **settings: Any) -> Option:
-    return name, {"metavar": metavar, "help": help, **settings}
-
-
-def _reader(kind: type, least: float | None) -> Callable[[str], Any]:
-    """A reader of whole numbers of at least `least`, or of numbers above it."""
+def option(
+    kind: Callable[[str], Any],
+    name: str,
+    metavar: Any,
+    help: str,
+    default: Any = None,
+    least: float | None = None,
+    **more: Any,
+) -> Option:
+    """An option with a value: a whole number of at least `least`, or a number above it."""
     whole = kind is int
 
     def read(text: str) -> Any:
@@ -153,31 +157,15 @@ def _reader(kind: type, least: float | None) -> Callable[[str], Any]:
         what = f"at least {least}, and at most {_MOST}" if whole else "positive"
         raise argparse.ArgumentTypeError(f"must be {what}, not {value}")
 
-    return read
+    return name, {"metavar": metavar, "help": help, "type": read, "default": default, **more}
 
 
-def number(
-    name: str, metavar: Any, help: str, default: Any = None, above: float | None = None, **more: Any
-) -> Option:
-    return text(name, metavar, help, type=_reader(float, above), default=default, **more)
-
-
-def count(
-    name: str, metavar: Any, help: str, default: Any = None, least: int | None = None, **more: Any
-) -> Option:
-    return text(name, metavar, help, type=_reader(int, least), default=default, **more)
-
-
-def choice(name: str, choices: Sequence[str], help: str, default: Any = None) -> Option:
-    return text(name, None, help, choices=choices, default=default)
+def output(what: str) -> Option:
+    return option(str, "--output", "PATH", what)
 
 
 def flag(name: str, help: str) -> Option:
     return name, {"action": "store_true", "help": help}
-
-
-def output(what: str) -> Option:
-    return text("--output", "PATH", what)
 
 
 PRINTING = (
@@ -187,28 +175,35 @@ PRINTING = (
 VERBOSE = flag("--verbose", "also print the search, the gait and every check")
 NO_FIGURE = flag("--no-figure", "do not draw a figure")
 BOUND = flag("--bound", "compute an upper bound on every gait (a minute; kept in bounds.sqlite)")
-WORKERS = count("--workers", "N", "processes, one BLAS thread each (default: 1)", 1, least=1)
+WORKERS = option(int, "--workers", "N", "processes, one BLAS thread each (default: 1)", 1, least=1)
 RETRY = flag("--retry", "solve again what ended in an error, a crash or the time limit")
-RESULT = text("result", "FILE.h5", "a result that colloc solve wrote")
+RESULT = option(str, "result", "FILE.h5", "a result that colloc solve wrote")
 _CHANGES = (
-    number("--delta", "SPEED", "final regularisation speed of friction"),
-    number("--delta-start", "SPEED", "first delta of the continuation"),
-    count("--mesh", "N", "intervals of the first mesh", dest="intervals"),
-    number("--mesh-tolerance", "TOL", "relative error to refine to; 0: never"),
-    text("--scheme", "NAME", "trapezoid, hermite-simpson, gauss-N or radau-N"),
-    text("--formulation", "NAME", "of the balance as constraints: full, or implicit velocity"),
+    option(float, "--delta", "SPEED", "final regularisation speed of friction"),
+    option(float, "--delta-start", "SPEED", "first delta of the continuation"),
+    option(int, "--mesh", "N", "intervals of the first mesh", dest="intervals"),
+    option(float, "--mesh-tolerance", "TOL", "relative error to refine to; 0: never"),
+    option(str, "--scheme", "NAME", "trapezoid, hermite-simpson, gauss-N or radau-N"),
+    option(
+        str, "--formulation", "NAME", "of the balance as constraints: full, or implicit velocity"
+    ),
 )
 PROBLEM = (
-    text("problem", None, "a Python file that states PROBLEM, for example problems/three_link.py"),
+    option(
+        str,
+        "problem",
+        None,
+        "a Python file that states PROBLEM, for example problems/three_link.py",
+    ),
     *_CHANGES,
 )
 """The problem file, and the changes to it that every solving command takes."""
-LENGTH = number("--length", "M", "of the stretched robot [m]")
-MASS = number("--mass", "KG", "of the robot [kg]")
-ROBOT = (LENGTH, MASS, number("--gravity", "G", "default: 9.81 m/s^2", 9.81))
-PERIOD = number("--period", "S", "seconds per period")
-MAX_SPEED = number("--max-speed", "V", "of the joints [rad/s], one or one each", nargs="+")
-MAX_TORQUE = number("--max-torque", "M", "of the joints [N m], one or one each", nargs="+")
+LENGTH = option(float, "--length", "M", "of the stretched robot [m]")
+MASS = option(float, "--mass", "KG", "of the robot [kg]")
+ROBOT = (LENGTH, MASS, option(float, "--gravity", "G", "default: 9.81 m/s^2", 9.81))
+PERIOD = option(float, "--period", "S", "seconds per period")
+MAX_SPEED = option(float, "--max-speed", "V", "of the joints [rad/s], one or one each", nargs="+")
+MAX_TORQUE = option(float, "--max-torque", "M", "of the joints [N m], one or one each", nargs="+")
 
 
 def read_problem(

@@ -108,9 +108,9 @@ are compared with those of another result, at the start phase and the symmetry o
   colloc verify results/three_link.h5 --tolerance 1e-8
   colloc verify results/a.h5 --compare results/b.h5""",
     cli.RESULT,
-    cli.number("--tolerance", "TOL", "of the replayed efficiency, relative", _TOLERANCE),
+    cli.option(float, "--tolerance", "TOL", "of the replayed efficiency, relative", _TOLERANCE),
     cli.flag("--dry", "also bounds under dry friction, with no delta"),
-    cli.text("--compare", "FILE.h5", "compare with this result, and replay neither"),
+    cli.option(str, "--compare", "FILE.h5", "compare with this result, and replay neither"),
 )
 def verify(options: argparse.Namespace) -> int:
     if not 0 < options.tolerance < 1:
@@ -221,7 +221,9 @@ The page needs no network and no other file. Results that failed get one too.
   colloc report results/three_link.h5                 results/three_link.html
   colloc report results/three_link.h5 --length 1.2 --mass 3 --period 5   of a robot""",
     cli.RESULT,
-    cli.text("--problem", "FILE.py", "problem file with the REFERENCE to compare the result with"),
+    cli.option(
+        str, "--problem", "FILE.py", "problem file with the REFERENCE to compare the result with"
+    ),
     cli.flag("--figures", "also write publication figures, PDF and PNG, one panel each"),
     *cli.ROBOT,
     *(cli.PERIOD, cli.MAX_SPEED, cli.MAX_TORQUE),
@@ -262,11 +264,17 @@ first two joint angles.
   colloc animate results/three_link.h5                            results/three_link.gif
   colloc animate results/three_link.h5 --format mp4 --fps 50      needs ffmpeg""",
     cli.RESULT,
-    cli.choice("--format", ("gif", "mp4"), "default: by the suffix of --output, else gif"),
-    cli.count("--periods", "N", "periods in a row (default: 2)", 2),
-    cli.number("--seconds", "S", "per period (default: 4)", 4.0),
-    cli.number("--fps", "N", "frames per second (default: 20)", 20.0),
-    cli.count("--width", "PIXELS", "default: 900", 900),
+    cli.option(
+        str,
+        "--format",
+        None,
+        "default: by the suffix of --output, else gif",
+        choices=("gif", "mp4"),
+    ),
+    cli.option(int, "--periods", "N", "periods in a row (default: 2)", 2),
+    cli.option(float, "--seconds", "S", "per period (default: 4)", 4.0),
+    cli.option(float, "--fps", "N", "frames per second (default: 20)", 20.0),
+    cli.option(int, "--width", "PIXELS", "default: 900", 900),
     cli.flag("--from-rest", "with inertia: the first periods of a body that starts at rest"),
     cli.flag("--no-arrows", "do not draw friction"),
     cli.output("folder or file (default: beside the result)"),
@@ -300,16 +308,19 @@ before time 0 lead from the straight body, at rest, into the gait.
 Columns: time_s, joint_1_rad, ..., joint_1_rad_per_s, ..., joint_1_N_m, ..., joint_1_W, ... (mode_1
 of a smooth body). Joints count from tail to head; angles are positive counter-clockwise.""",
     cli.RESULT,
-    cli.number("--rate", "HZ", "samples a second (default: 50)", 50.0),
+    cli.option(float, "--rate", "HZ", "samples a second (default: 50)", 50.0),
     cli.PERIOD,
     cli.MAX_SPEED,
     *cli.ROBOT,
-    cli.count("--periods", "N", "repeat the period N times (default: 1)", 1),
-    cli.text(
+    cli.option(int, "--periods", "N", "repeat the period N times (default: 1)", 1),
+    cli.option(str,
         "--ramp", None, "begin straight, at rest, before time 0 (default)", default=True,
         action=argparse.BooleanOptionalAction,
     ),
-    cli.choice("--format", ("csv", "json", "mjcf", "urdf"), "default: --output's, else csv"),
+    cli.option(
+        str, "--format", None, "default: --output's, else csv",
+        choices=("csv", "json", "mjcf", "urdf"),
+    ),
     cli.output("folder or file (default: beside the result)"),
 )  # fmt: skip
 def export(options: argparse.Namespace) -> int:

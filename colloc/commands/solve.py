@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
 _MANY_INTERVALS, _SECONDS_PER_INTERVAL = 1000, 0.02
-_SEARCHES = ("reduced", "full")
 EXIT = {
     SOLVED: OK,
     NOT_CONVERGED: NONE_FOUND,
@@ -87,10 +86,10 @@ or --wheels.
   colloc init mine.py --links 4 --feet 1
   colloc init mine.py --lengths 22 30 30 22 --wheels
   colloc solve mine.py""",
-    cli.text("problem", "FILE.py", "the file to write", type=Path),
-    cli.count("--links", "N", f"equal links (default: {_FEWEST})"),
-    cli.number("--lengths", "L", "of the links, tail to head, in any unit", nargs="+"),
-    cli.count("--feet", "N", "feet on each link (default: none, links lie flat)"),
+    cli.option(Path, "problem", "FILE.py", "the file to write"),
+    cli.option(int, "--links", "N", f"equal links (default: {_FEWEST})"),
+    cli.option(float, "--lengths", "L", "of the links, tail to head, in any unit", nargs="+"),
+    cli.option(int, "--feet", "N", "feet on each link (default: none, links lie flat)"),
     cli.flag("--wheels", "a wheel in the middle of each link"),
 )
 def init(options: argparse.Namespace) -> int:
@@ -290,28 +289,32 @@ from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
   colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
   colloc solve mine.py --start results/three_link.h5      begin with the gait of another result""",
     *cli.PROBLEM,
-    cli.text("--start", "FILE.h5", "start from the gait of an earlier result"),
+    cli.option(str, "--start", "FILE.h5", "start from the gait of an earlier result"),
     cli.flag("--fresh", "do not go on from an interrupted run"),
     cli.output("folder, or .h5 file (default: results/NAME.h5)"),
-    cli.count(
+    cli.option(
+        int,
         "--starts",
         "N",
         "minimum number of starting points (default: 32); 1: the guess alone",
         least=1,
     ),
-    cli.number(
+    cli.option(
+        float,
         "--seconds",
         "S",
         "wall time allowed; then the best gait so far counts",
         math.inf,
-        above=0,
+        least=0,
     ),
-    cli.choice(
+    cli.option(
+        str,
         "--search",
-        _SEARCHES,
+        None,
         "reduced: SQP on the gait's parameters, confirmed by IPOPT on the full program (default); "
         "full: IPOPT on the full program at every level of delta, from the guess alone",
-        _SEARCHES[0],
+        "reduced",
+        choices=("reduced", "full"),
     ),
     cli.BOUND,
     cli.flag("--dry", "certify it also under dry friction, with no delta (a second)"),
@@ -392,10 +395,12 @@ include the residual of the samples, with two standard deviations.
 
   colloc evaluate problems/three_link.py mine.csv                          results/mine-evaluated.h5
   colloc verify results/mine-evaluated.h5 --compare results/three_link.h5""",
-    cli.text("problem", None, "a Python file that states PROBLEM, for body, friction and limits"),
-    cli.text("gait", "GAIT.csv", "times and joint angles"),
-    cli.number("--period", "T", "in the file's unit of time (default: from repetition)"),
-    cli.count("--harmonics", "N", "of the fit (default: as many as the samples determine)"),
+    cli.option(
+        str, "problem", None, "a Python file that states PROBLEM, for body, friction and limits"
+    ),
+    cli.option(str, "gait", "GAIT.csv", "times and joint angles"),
+    cli.option(float, "--period", "T", "in the file's unit of time (default: from repetition)"),
+    cli.option(int, "--harmonics", "N", "of the fit (default: as many as the samples determine)"),
     cli.flag("--degrees", "angles are degrees where names do not say what they are"),
     cli.output("folder or .h5 file (default: results/GAIT-evaluated.h5)"),
     cli.VERBOSE,

@@ -98,7 +98,7 @@ def solve(
         raise ProblemError(f"seconds must be positive, not {seconds:g}.")
     if output is not None and not Path(output).name:
         raise ProblemError(f"output must name a file, not {shown(str(output))}.")
-    path, report = None if output is None else Path(output), _reporter(verbose, progress)
+    path, report = None if output is None else Path(output), reporter(verbose, progress)
     settings: dict[str, Any] = {"seconds": seconds, "search": search, "progress": report}
     solution = resume(stated, path, starts=starts or stated.starts, **settings)
     if path is not None:
@@ -112,7 +112,7 @@ def _read(problem: Stated) -> ProblemFile:
     return read_problem_file(problem)
 
 
-def _reporter(verbose: bool, progress: Callable[..., object] | None) -> Callable[..., None]:
+def reporter(verbose: bool, progress: Callable[..., object] | None) -> Callable[..., None]:
     def report(news: object) -> None:
         if verbose:
             print(news, flush=True)
@@ -268,7 +268,7 @@ def multistart(
         raise ProblemError(f"time_limit must be positive, not {time_limit:g}.")
     problem = _read(problem).problem
     store = Archive(problem) if archive is None else open_archive(problem, archive)
-    done, report = store.done(sampler, seed, starts), _reporter(verbose, progress)
+    done, report = store.done(sampler, seed, starts), reporter(verbose, progress)
     how: dict[str, Any] = {"workers": workers, "time_limit": time_limit, "executor": pool_for}
     todo = (k for k in range(starts) if k not in done)
     try:

@@ -12,6 +12,7 @@ import json
 import math
 import os
 import tempfile
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
@@ -28,7 +29,7 @@ from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.law import rate_independent
 from colloc.mechanics.native_kernel import native_kernel
 from colloc.results.distinct_optima import fourier_series, series_class
-from colloc.results.outcome import CRASHED, RETRIED, UNITS
+from colloc.results.outcome import CRASHED, RETRIED, UNITS, counts
 from colloc.results.solution import SOLVED, versions
 from colloc.studies.cell import (
     BETTER,
@@ -43,6 +44,7 @@ from colloc.studies.cell import (
     start_key,
 )
 from colloc.studies.gait_class import gait_class
+from colloc.studies.solve import reporter
 from colloc.studies.study import ARRAYS, COLUMNS, NUMBERS, Index, Study, read_study_file
 from colloc.system.arguments import check_count
 from colloc.system.errors import ProblemError
@@ -82,14 +84,23 @@ class CellState:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """A cell that was just visited; `done` of `total` cells of a round."""
+    """A cell that was just visited; `done` of `total` cells of a round, in so many `seconds`."""
 
+    label: str
     cell: Index
     state: CellState
     new: list[Attempt]
     round: int
     done: int
     total: int
+    seconds: float
+
+    def __str__(self) -> str:
+        value = f"{self.state.best.outcome.value:9.6f}" if self.state.best else "     none"
+        tries = ", ".join(f"{n} {x}" for x, n in counts([a.outcome for a in self.new]).items())
+        left = self.seconds / self.done * (self.total - self.done)
+        where = f"round {self.round}: {self.done} of {self.total}, {left:.0f} s left"
+        return f"{self.label}: {value}  ({tries}; {where})"
 
 
 class StudyRun:
@@ -157,7 +168,7 @@ class StudyRun:
         first = _Wavefront(self)
         tasks, total = first.ready, lambda: first.total
         for number in itertools.count():
-            done = 0
+            done, begin = 0, time.perf_counter()
             for task, result in run_tasks(
                 run_chunk, tasks, workers=workers, executor=executor, ahead=ahead
             ):
@@ -172,8 +183,9 @@ class StudyRun:
                 for work, visited in zip(works, result, strict=True):
                     done += 1
                     if new := visited.attempts:
-                        state = self.state(work.cell)
-                        yield Progress(work.cell, state, new, number, done, total())
+                        cell, seconds = work.cell, time.perf_counter() - begin
+                        at = self.study.label(cell), cell, self.state(cell)
+                        yield Progress(*at, new, number, done, total(), seconds)
             improvable = [
                 cell
                 for cell, state in list(self.cells.items())
@@ -388,14 +400,10 @@ def sweep(
     ['solved', 'solved']
     """
     check_count(workers=workers)
+    report = reporter(verbose, progress)
     study = study if isinstance(study, Study) else read_study_file(study)[0]
     with tempfile.TemporaryDirectory() as scratch:
         run = StudyRun(study, Path(folder or scratch))
         for news in run.run(workers=workers, executor=pool_for):
-            if verbose:
-                best = news.state.best
-                value = best.outcome.value if best else np.nan
-                print(f"{study.label(news.cell)}: {value:.6f}", flush=True)
-            if progress is not None:
-                progress(news)
+            report(news)
         return study_table(run)

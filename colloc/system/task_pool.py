@@ -130,11 +130,6 @@ def pool_for(workers: int) -> Executor:
     return process_pool(workers) if workers > 1 else _InThisProcess()
 
 
-def _check(pool: Executor) -> None:
-    if hasattr(pool, "check"):
-        pool.check()
-
-
 def run_tasks(
     function: Callable[..., Any],
     ready: Callable[[], Task | None],
@@ -158,6 +153,7 @@ def run_tasks(
             alone = bool(suspects)
             most = 1 if alone else workers + ahead
             pool = executor(1 if alone else workers)
+            check = getattr(pool, "check", lambda: None)
             pending: dict[Future, Task] = {}
             any_submitted, listened = False, True
             try:
@@ -181,13 +177,13 @@ def run_tasks(
                     with interruptible():
                         done = wait(pending, timeout=_MOMENT, return_when=FIRST_COMPLETED).done
                     if not done:
-                        _check(pool)
+                        check()
                     for future in done:
                         error = CancelledError() if future.cancelled() else future.exception()
                         if isinstance(error, (BrokenExecutor, EngineGone)):
                             raise error
                         if error is not None:
-                            _check(pool)
+                            check()
                         task = pending.pop(future)
                         if error is None:
                             yield task, future.result()

@@ -235,10 +235,11 @@ def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_
     run = StudyRun(grid(cold_starts=0), tmp_path)
     finished(run)
     assert {a.origin for a in run.cells[1, 1].attempts} == {GUESS, WARM, RESCUE}
-    table = study_table(run).variables
+    whole = study_table(run)
+    table = whole.variables
     assert np.argwhere(table["below_neighbour"]).tolist() == [[1, 1]]
     assert table["neighbour_value"][1, 1] == pytest.approx(0.31)
-    lines = sweep_summary(run, tmp_path)[1]
+    lines = sweep_summary(run.study, whole, tmp_path)[1]
     assert "1 of them below what a neighbour's gait achieves there" in lines[1]
     assert "x 2, y 2: 0.220000, where a neighbour's gait achieves 0.310000" in lines[2]
     # what was seen is in the journal

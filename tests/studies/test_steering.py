@@ -48,6 +48,7 @@ def test_half_way_between_two_turns_lies_about_half_of_the_turn(family):
 def test_a_turn_to_the_right_is_the_mirror_image_of_that_to_the_left(family):
     right, _, left = family.points
     t = np.linspace(0, 1, 50)
+    np.testing.assert_allclose(right.problem.guess.angles(t), -left.gait.angles(t), atol=1e-12)
     # the mirror image is found at one of two phases, half a period apart
     apart = min(
         np.abs(right.gait.angles(t) + left.gait.angles(t + later)).max() for later in (0, 0.5)
@@ -63,6 +64,22 @@ def test_a_body_that_is_not_its_mirror_image_turns_to_both_sides():
     bent = Coupled(Harmonic(1), stuck={1: 0.5})
     problem = Problem("stuck", body=body, friction=friction, gait=bent, delta=1e-2)
     assert steer(problem, [-0.2, 0.2], starts=2).certified
+
+
+def test_with_one_sided_limits_both_sides_are_sought_from_the_straight_gait_and_keep_them():
+    """The mirror image of a gait within (-1.5, 2.6) need not be within it."""
+    straight, limits, turns = [], ((-1.5, 2.6), (-1.5, 2.6)), [-0.15, 0.15]
+    problem = PROBLEM.with_(joint_limit=limits, gait=Harmonic(1), mesh_tolerance=1e-3)
+    family = steer(problem, turns, starts=2, progress=lambda *news: straight.append(news))
+    assert family.certified
+    assert straight[0][0] == 0
+    begun = straight[0][1].gait.angles(np.linspace(0, 1, 40))
+    for point, turn in zip(family.points, turns, strict=True):
+        guess = point.problem.guess.angles(np.linspace(0, 1, 40))
+        np.testing.assert_allclose(guess, begun, atol=1e-12)
+        angles = point.gait.angles(np.linspace(0, 1, 400))
+        assert -1.5 - 1e-6 < angles.min() < angles.max() < 2.6 + 1e-6
+        assert point.rotation == pytest.approx(turn, abs=0.01)
 
 
 def test_the_table_holds_the_joint_angles_of_every_gait(family):
