@@ -24,9 +24,8 @@ from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
-from colloc.results.distinct_optima import Basin, basins
+from colloc.results.archive import STATUSES, Basin, Outcome, basins, counts
 from colloc.results.kept import save_result
-from colloc.results.outcome import STATUSES, Outcome, counts
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import ProblemError, StoreError
 from colloc.system.files import SUFFIX, lock_file, write_text

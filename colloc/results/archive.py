@@ -1,4 +1,4 @@
-"""Archives of searches over many starts of one problem.
+"""Outcomes of many starts of one problem, their distinct optima, and archives of them.
 
 Rows (NAME.sqlite) hold every start with its gait, by sampler, seed and number, as it ends; searches
 go on from them, also at the same time. NAME.h5 is made of them for users: columns over ``start``,
@@ -8,9 +8,10 @@ columns ``basin_...`` of the distinct optima, best first (``basin_row``: row of 
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,16 +19,41 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from colloc.gaits.gait_fields import AnyGait, fields, gait_from
+from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
-from colloc.results.distinct_optima import basins, fourier_series
-from colloc.results.outcome import RETRIED, UNITS, Outcome, outcome_fields, outcome_from
-from colloc.results.solution import versions
+from colloc.results.distinct_optima import are_one, fourier_series
+from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, versions
 from colloc.system.errors import StoreError
 from colloc.system.files import lock_file
 from colloc.system.row_file import put_rows, read_rows
 from colloc.system.store_file import Table, save_table
 
+TRIVIAL, ERROR, TIME_LIMIT, CRASHED = "trivial gait", "error", "time limit", "crashed"
+PASSED_OVER = "passed over"
+"""Status of a start that was no better than the incumbent and was not certified."""
+UNITS = {
+    **dict.fromkeys(("efficiency", "efficiency_error"), "1/weight"),
+    **dict.fromkeys(("value", "value_error"), "of the objective"),
+    "distance": "length",
+    "work": "weight length",
+    "delta": "length/period",
+    "seconds": "s",
+}
+RETRIED = (ERROR, CRASHED, TIME_LIMIT)
+STATUSES = (
+    SOLVED,
+    TRIVIAL,
+    CERTIFICATE_FAILED,
+    NOT_CONVERGED,
+    PASSED_OVER,
+    TIME_LIMIT,
+    ERROR,
+    CRASHED,
+)
+_LONGEST_MESSAGE = 1000
+_READERS: dict[Any, Any] = {"int": int, "str": str, "float": float, "AnyGait": gait_from}
 _KIND, _VERSION = "colloc archive", 4
 _ROWS = "colloc starts 2"
 _TEXTS = dict.fromkeys(("sampler", "status", "message"), "text")
@@ -42,6 +68,98 @@ _UNITS = {
     "basin_efficiency": "1/weight",
     "basin_value": "of the objective",
 }
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Outcome of one start."""
+
+    start: int
+    status: str
+    message: str
+    guess: AnyGait
+    gait: AnyGait
+    efficiency: float = np.nan
+    efficiency_error: float = np.nan
+    distance: float = np.nan
+    work: float = np.nan
+    delta: float = np.nan
+    iterations: int = 0
+    seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    value: float = np.nan
+    value_error: float = np.nan
+
+    def __post_init__(self) -> None:
+        for name, usual in (("value", self.efficiency), ("value_error", self.efficiency_error)):
+            if np.isnan(getattr(self, name)):
+                object.__setattr__(self, name, usual)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Outcome of start {self.start}: {self.status}, d/W = {self.efficiency:.6g}, "
+            f"{self.cpu_seconds:.1f} s>"
+        )
+
+
+def outcome_fields(outcome: Outcome) -> dict[str, Any]:
+    """Plain fields (numbers, strings, lists) of an outcome."""
+    gaits = {"guess": fields(outcome.guess), "gait": fields(outcome.gait)}
+    return {**vars(outcome), "message": outcome.message[:_LONGEST_MESSAGE], **gaits}
+
+
+def outcome_from(entry: dict[str, Any]) -> Outcome:
+    """Outcome from `outcome_fields`."""
+    if entry["status"] not in STATUSES:
+        raise ValueError(f"no status: {entry['status']}")
+    types = {field.name: field.type for field in dataclasses.fields(Outcome)}
+    return Outcome(**{name: _READERS[kind](entry[name]) for name, kind in types.items()})
+
+
+def counts(outcomes: Sequence[Outcome]) -> dict[str, int]:
+    """Number of starts of each status that occurs."""
+    return {s: n for s in STATUSES if (n := sum(o.status == s for o in outcomes))}
+
+
+@dataclass(frozen=True, eq=False)
+class Basin:
+    """A distinct certified optimum and the starts that ended there.
+
+    Attributes
+    ----------
+    best : Outcome
+        Its member of largest value.
+    starts : tuple of int
+    frequency : float
+        Share of all starts tried.
+    """
+
+    best: Outcome
+    starts: tuple[int, ...]
+    frequency: float
+
+    def __repr__(self) -> str:
+        return f"<Basin with d/W = {self.best.efficiency:.6g} of {len(self.starts)} starts>"
+
+
+def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
+    """The distinct certified optima, best first.
+
+    Outcomes join the first, better, optimum they agree with in value and in gait modulo start phase
+    and the symmetries of body and friction (see `images`).
+    """
+    groups: list[tuple[list[Outcome], Fourier]] = []
+    for outcome in sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value):
+        path = fourier_series(problem, outcome.gait)
+        for members, near in groups:
+            if are_one((members[0].value, near), (outcome.value, path), problem.body, problem.law):
+                members.append(outcome)
+                break
+        else:
+            groups.append(([outcome], path))
+    return [
+        Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m, _ in groups
+    ]
 
 
 class StartName(NamedTuple):

@@ -1,4 +1,4 @@
-"""Symmetry images of gaits, and the distinct optima among many starts.
+"""Symmetry images of gaits, and which gaits are one.
 
 With X(s, t) the position of the body, the following map motions in balance to motions in balance
 with the same distance and work. All are statements about joint angles q_j, counted from the tail, n
@@ -19,8 +19,6 @@ its own image, and the image turns the other way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -30,8 +28,6 @@ from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.results.outcome import Outcome
-from colloc.results.solution import SOLVED
 
 _GRID = 64
 _NEWTON_STEPS = 6
@@ -102,44 +98,3 @@ def series_class(problem: Problem) -> Harmonic:
 
 def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:
     return series_class(problem).through(gait)
-
-
-@dataclass(frozen=True, eq=False)
-class Basin:
-    """A distinct certified optimum and the starts that ended there.
-
-    Attributes
-    ----------
-    best : Outcome
-        Its member of largest value.
-    starts : tuple of int
-    frequency : float
-        Share of all starts tried.
-    """
-
-    best: Outcome
-    starts: tuple[int, ...]
-    frequency: float
-
-    def __repr__(self) -> str:
-        return f"<Basin with d/W = {self.best.efficiency:.6g} of {len(self.starts)} starts>"
-
-
-def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
-    """The distinct certified optima, best first.
-
-    Outcomes join the first, better, optimum they agree with in value and in gait modulo start phase
-    and the symmetries of body and friction (see `images`).
-    """
-    groups: list[tuple[list[Outcome], Fourier]] = []
-    for outcome in sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value):
-        path = fourier_series(problem, outcome.gait)
-        for members, near in groups:
-            if are_one((members[0].value, near), (outcome.value, path), problem.body, problem.law):
-                members.append(outcome)
-                break
-        else:
-            groups.append(([outcome], path))
-    return [
-        Basin(m[0], tuple(sorted(o.start for o in m)), len(m) / len(outcomes)) for m, _ in groups
-    ]

@@ -21,10 +21,22 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.gaits.starts import LARGEST_SEED, LATIN_HYPERCUBE, SAMPLERS, start_gait
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.results.archive import Archive, StartName, open_archive, save_archive
-from colloc.results.distinct_optima import Basin, basins
+from colloc.results.archive import (
+    CRASHED,
+    ERROR,
+    PASSED_OVER,
+    TIME_LIMIT,
+    TRIVIAL,
+    Archive,
+    Basin,
+    Outcome,
+    StartName,
+    basins,
+    counts,
+    open_archive,
+    save_archive,
+)
 from colloc.results.kept import Saved, save_result
-from colloc.results.outcome import CRASHED, ERROR, PASSED_OVER, TIME_LIMIT, TRIVIAL, Outcome, counts
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.certify import is_trivial
 from colloc.search.checkpoint import Progress
@@ -247,7 +259,7 @@ def multistart(
     verbose : bool
         Print every outcome.
     progress : callable, optional
-        Called with every `colloc.results.outcome.Outcome`.
+        Called with every `colloc.results.archive.Outcome`.
 
     Examples
     --------

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from colloc import Axis, Fourier, Harmonic, Problem, Study, ellipse, load, save
-from colloc.results.archive import Archive, StartName, open_archive
-from colloc.results.outcome import Outcome
+from colloc.results.archive import Archive, Outcome, StartName, open_archive
 from colloc.studies.cell import NAME, Attempt, Visit, append_visits, read_journal
 from colloc.studies.sweep import KIND, VERSION, StudyRun, save_study, study_table
 from colloc.system.row_file import CACHE, put_rows, read_rows

@@ -30,10 +30,21 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.contact import crossing_depth
 from colloc.results import distinct_optima
-from colloc.results.archive import Archive, StartName, open_archive, row_path, save_archive
+from colloc.results.archive import (
+    CRASHED,
+    ERROR,
+    TIME_LIMIT,
+    Archive,
+    Outcome,
+    StartName,
+    basins,
+    counts,
+    open_archive,
+    row_path,
+    save_archive,
+)
 from colloc.results.checks import UNCERTIFIED
-from colloc.results.distinct_optima import basins, images, phase_distance, reversed_in_time
-from colloc.results.outcome import CRASHED, ERROR, TIME_LIMIT, Outcome, counts
+from colloc.results.distinct_optima import images, phase_distance, reversed_in_time
 from colloc.results.solution import SOLVED
 from colloc.search import certify
 from colloc.search.certify import is_trivial
