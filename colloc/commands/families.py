@@ -19,7 +19,7 @@ import numpy as np
 
 from colloc.commands import main as cli
 from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK, naming_saved_files
-from colloc.commands.solve import bound_facts, kept_facts, kept_lines, save_and_tell
+from colloc.commands.solve import bound_facts, save_and_tell
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
 from colloc.gaits.problem import Problem
@@ -336,8 +336,8 @@ def _family(
             with naming_saved_files([f"{table}{points}"]):
                 files += save_figure(family.plot(), table.with_suffix(""), ("png",))
         last = f"  saved {', '.join(map(str, files))}{points}"
-        lines = [f"{problem.name}: {lines[0]}", *lines[1:], last, *kept_lines(saved)]
-        cli.tell(options, facts | {"file": str(table), "kept": kept_facts(saved)}, lines)
+        lines = [f"{problem.name}: {lines[0]}", *lines[1:], last]
+        cli.tell(options, facts | {"file": str(table)}, lines, saved)
     return OK if family.certified else FAILED
 
 

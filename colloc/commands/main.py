@@ -23,6 +23,7 @@ from colloc.system.progress import StatusLine
 if TYPE_CHECKING:
     from colloc.gaits.problem import Problem
     from colloc.gaits.problem_file import ProblemFile
+    from colloc.results.kept import Saved
 
 SUBCOMMANDS = {
     "init": ("solve", "write a commented problem file for a chain of links, to change and solve"),
@@ -252,8 +253,15 @@ def complain(sentence: str) -> None:
     print(f"colloc: {sentence}", file=sys.stderr, flush=True)
 
 
-def tell(options: argparse.Namespace, facts: dict, lines: Sequence[str]) -> None:
-    """Print the result of a command: facts as one JSON object, or lines for people."""
+def tell(
+    options: argparse.Namespace, facts: dict, lines: Sequence[str], saved: list[Saved] | None = None
+) -> None:
+    """Print the result of a command, and what became of former results: facts as one JSON object,
+    or lines for people."""
+    former = [one for one in saved or () if one.former is not None]
+    if saved is not None:
+        facts = facts | {"kept": [str(one.former) for one in former]}
+    lines = [*lines, *(f"  {one.why} is kept as {one.former}" for one in former)]
     show(json.dumps(facts) if options.json else "\n".join(lines))
 
 

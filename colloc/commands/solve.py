@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -140,9 +140,9 @@ def init(options: argparse.Namespace) -> int:
 def save_and_tell(options: argparse.Namespace, solution: Solution, path: Path) -> int:
     """Save a solution and print its summary; returns the exit code."""
     saved = save_result(solution, path)
-    facts = {**summary_dict(solution, saved[0].path, None, None), "kept": kept_facts(saved)}
+    facts = summary_dict(solution, saved[0].path, None, None)
     lines = summary_lines(solution, None, verbose=options.verbose)
-    cli.tell(options, facts, [*lines, f"  saved {saved[0].path}", *kept_lines(saved)])
+    cli.tell(options, facts, [*lines, f"  saved {saved[0].path}"], saved)
     return EXIT[solution.status]
 
 
@@ -272,14 +272,6 @@ def bound_facts(bound: Bound | None) -> dict | None:
     return None if bound is None else {"sampled": bound.sampled, "guaranteed": bound.guaranteed}
 
 
-def kept_lines(saved: Sequence[Saved]) -> list[str]:
-    return [f"  {one.why} is kept as {one.former}" for one in saved if one.former is not None]
-
-
-def kept_facts(saved: Sequence[Saved]) -> list[str]:
-    return [str(one.former) for one in saved if one.former is not None]
-
-
 @cli.command(
     """\
 A failed solve is kept as NAME.failed.h5, a former result of another problem called NAME, or a
@@ -369,7 +361,7 @@ def solve(options: argparse.Namespace) -> int:
         facts = summary_dict(solution, path if saved else None, stated.reference, bound)
         lines = summary_lines(solution, stated.reference, verbose=options.verbose)
         gap = gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)
-        cli.tell(options, facts | {"kept": kept_facts(records)}, [*lines, gap])
+        cli.tell(options, facts, [*lines, gap], records)
         if saved and not options.no_figure and ended:
             from colloc.pictures.style import save as save_figure
 
@@ -378,7 +370,7 @@ def solve(options: argparse.Namespace) -> int:
                 figure, kinds = solution.plot(), ("png", "pdf")[: 1 + options.pdf]
                 saved += map(str, save_figure(figure, path.with_suffix(""), kinds))
     if saved and not options.json:
-        print("\n".join([f"  saved {', '.join(saved)}", *kept_lines(records)]))
+        print(f"  saved {', '.join(saved)}")
     if not ended:
         complaints.append("interrupted; the same command goes on from there.")
     for complaint in complaints:

@@ -429,26 +429,6 @@ def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_ke
     assert np.isnan(table["cos"][0, :, 1:]).all()
 
 
-@pytest.mark.slow
-def test_a_study_over_classes_is_solved_and_certified(tmp_path):
-    corners = Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
-    guesses = {"triangle": corners}
-
-    def stated(kind):
-        return in_class(
-            kind, guesses.get(kind, ellipse(0, 2.8, 1.3)), 60 if kind == "spline" else 24
-        )
-
-    axis = Axis("kind", tuple(CLASSES), travels=False)
-    run = StudyRun(Study("kinds", (axis,), stated, cold_starts=0), tmp_path)
-    finished(run)
-    efficiency = study_table(run).variables["efficiency"]
-    # harmonics, triangles and splines: docs/gait_classes.md
-    assert efficiency[0] == pytest.approx(0.260, abs=2e-3)
-    assert efficiency[1] > 0.39
-    assert efficiency[2] > 0.36
-
-
 def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
     # joint 2 repeats joint 1 a quarter period later
     quarter = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [1.0]])
