@@ -300,7 +300,7 @@ def sweep_summary(study: Study, table: StudyTable, path: Path) -> tuple[dict[str
 def _family(
     options: argparse.Namespace,
     ending: str,
-    find: Callable[[Problem, int, Callable[[str], None]], Any],
+    find: Callable[[Problem, int, Callable[..., None]], Any],
     describe: Callable[[Any, dict[Path, Solution]], tuple[str, dict[str, Any], list[str]]],
 ) -> int:
     """Find a family, save its members and its table, draw and print it; the exit code.
@@ -318,7 +318,12 @@ def _family(
     members, saved = dict[Path, Solution](), []
     with checkpoints_in(table.with_suffix("")):
         with cli.status_line(options) as line:
-            family = find(problem, starts, lambda text: line.say(f"{problem.name}: {text}"))
+
+            def say(what: str, point: Solution | None = None) -> None:
+                value = point and f": {point.problem.objective.short} = {point.value:.6g}"
+                line.say(f"{problem.name}: {what}{value or ''}")
+
+            family = find(problem, starts, say)
         named = {f"{k:02d}": point for k, point in enumerate(family.points)}
         if spot := getattr(family, "on_the_spot", None):
             named |= {f"spot_{k:02d}": point for k, point in enumerate(spot.points)}
@@ -365,12 +370,12 @@ the last one the best by the second. Exit code 4: a gap is left where gaits are 
 def pareto(options: argparse.Namespace) -> int:
     first, second = aims = [objective_from(text) for text in options.objectives]
 
-    def find(problem: Problem, starts: int, say: Callable[[str], None]) -> ParetoFront:
+    def find(problem: Problem, starts: int, say: Callable[..., None]) -> ParetoFront:
         from colloc.studies.families import pareto_front
 
         def report(k: int, point: Solution) -> None:
             last = options.points - 1
-            say(f"{f'point {k} of {last}' if k <= last else 'in a gap'}: {point}")
+            say(f"point {k} of {last}" if k <= last else "in a gap", point)
 
         say("the ends of the front")
         return pareto_front(problem, first, second, options.points, starts=starts, progress=report)
@@ -425,11 +430,11 @@ def steer(options: argparse.Namespace) -> int:
             "could turn the other way."
         )
 
-    def find(problem: Problem, starts: int, say: Callable[[str], None]) -> Steering:
+    def find(problem: Problem, starts: int, say: Callable[..., None]) -> Steering:
         from colloc.studies.families import steer as find_gaits
 
         def report(turn: float, point: Solution) -> None:
-            say(f"{math.degrees(turn):+.4g} degrees a period: {point}")
+            say(f"{math.degrees(turn):+.4g} degrees a period", point)
 
         say("the straight gait")
         turns, spot = ([*map(math.radians, each)] for each in (options.turn, options.spot))
