@@ -142,18 +142,6 @@ class StudyRun:
         bests = (self.state(other).best for other in self.study.around(cell))
         return [best for best in bests if best is not None]
 
-    def neighbour_value(self, cell: Index) -> float:
-        """Largest value in a cell of a neighbour's best gait, projected but not optimised; or
-        NaN."""
-        known = self.state(cell).scores
-        scores = (known.get(best.gait_key, math.nan) for best in self.neighbours(cell))
-        return max((score for score in scores if not math.isnan(score)), default=math.nan)
-
-    def below_neighbour(self, cell: Index) -> bool:
-        """True if a neighbour's gait does clearly better in the cell than its own best."""
-        best = self.state(cell).best
-        return best is not None and self.neighbour_value(cell) > (1 + BETTER) * best.outcome.value
-
     def run(
         self,
         *,
@@ -324,6 +312,7 @@ def _row(
     if problem is None:
         return {"status": NO_PROBLEM, "message": state.message}
     outcomes, bound = [a.outcome for a in state.attempts], known_bound(problem)
+    known = [state.scores.get(each.gait_key, math.nan) for each in run.neighbours(cell)]
     row: dict[str, Any] = {
         "problem_hash": problem.hash,
         "starts": len(outcomes),
@@ -331,8 +320,8 @@ def _row(
         "seconds": sum(o.seconds for o in outcomes),
         "trivial_bound": 1.0 / problem.law.smallest if rate_independent(problem.law) else np.nan,
         "upper_bound": np.nan if bound is None else bound,
-        "neighbour_value": run.neighbour_value(cell),
-        "below_neighbour": int(run.below_neighbour(cell)),
+        # largest value here of a neighbour's best gait, projected but not optimised
+        "neighbour_value": max((x for x in known if not math.isnan(x)), default=math.nan),
     }
     if best is None:
         last = {name: getattr(o, name) for o in outcomes[-1:] for name in ("status", "message")}
@@ -340,6 +329,7 @@ def _row(
     outcome = best.outcome
     gait = fourier_series(problem, outcome.gait)
     row |= {"status": SOLVED, "origin": best.origin}
+    row["below_neighbour"] = int(row["neighbour_value"] > (1 + BETTER) * outcome.value)
     row |= {name: getattr(outcome, name) for name in NUMBERS}
     row |= {name: getattr(gait, name) for name in ARRAYS}
     row["delta"] = delta_per_period(problem.gait, outcome.gait, outcome.delta)

@@ -139,7 +139,7 @@ def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning_and_not_the_bo
 ):
     problem = read_problem_file(quick).problem
     # anything with fields
-    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: problem.friction)
+    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: (problem.friction, None))
     (tmp_path / "file").write_text("in the way of the folder")
     with pytest.warns(UserWarning, match="cannot write .*The bound is not kept"):
         assert upper_bound(problem, tmp_path / "file" / "below", compute=True) is problem.friction

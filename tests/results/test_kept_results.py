@@ -158,7 +158,7 @@ def test_solve_says_where_the_result_of_another_problem_of_this_name_went(tmp_pa
     said = capsys.readouterr().out
     former = next(tmp_path.glob("mine*.former-1.h5"))
     assert re.search(
-        rf"the former result, of another problem called mine, is kept as {former}\n$", said
+        rf"the former result, of another problem called mine, is kept as {former}\n", said
     )
     assert load(former).problem.delta == 2e-2
     assert former.with_suffix(".png").exists()
