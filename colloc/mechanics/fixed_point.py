@@ -30,7 +30,7 @@ from colloc.mechanics.damped_newton import METHODS, State, groups, relative_delt
 from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.law import Law
 from colloc.mechanics.native_kernel import call_for_all, native_kernel
-from colloc.system.arguments import check_finite
+from colloc.system.arguments import check_finite, shown
 from colloc.system.errors import ProblemError
 
 _SMOOTHER = 2.0
@@ -101,6 +101,8 @@ def solve_balance(
     >>> solved.require().z.round(3).ravel().tolist()
     [0.02, 0.255, -0.887]
     """
+    if isinstance(body, type) or not is_chain(body):
+        raise ProblemError(f"body must be a Chain, not {shown(body)}.")
     if body.n_joint != body.n_link - 1:
         raise ProblemError(
             f"the shape coordinates of {type(body).__name__} are not its {body.n_link - 1} joints: "

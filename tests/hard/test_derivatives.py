@@ -98,7 +98,7 @@ def check_point(body, friction, angles, rates, delta, formulation, *, rng=None, 
         x = np.array([phi, w, vs * c - vn * s, vs * s + vn * c, *forces])
         if rng is not None:
             x = x + 0.01 * rng.normal(size=x.size)
-        given = repeated.values[:, repeated.n_instance // body.n_link * link]
+        given = repeated.values[:, repeated.gather.shape[1] // body.n_link * link]
         check(function, x, given, delta, step, None, tolerance)
 
 
