@@ -230,8 +230,7 @@ class Splines(LinearClass):
         return self.angle_matrix(times, n_joint, 1)
 
     def side_rates(self, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
-        """Fraction of the time of each side ``(n_side,)``, and joint rates on it per parameter
-        ``(n_side, n_joint, n_parameter)``."""
+        """Fraction of the time of each side, and joint rates on it per parameter."""
         middles = 0.5 * (self.pieces[1:] + self.pieces[:-1])
         return np.diff(self.pieces) / self.pieces[-1], self.angle_matrix(middles, n_joint, 1)
 
@@ -285,8 +284,7 @@ class Splines(LinearClass):
 
 
 def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
-    """Indices of the ``pieces + 1`` points, ends included, whose chords are nearest to all points
-    (dynamic programming)."""
+    """Indices of ``pieces + 1`` points whose chords are nearest to all (dynamic programming)."""
     n = points.shape[1]
     cost, before = np.full((n, n), np.inf), np.triu(np.ones((n, n)), 1)
     for i in range(n - 1):

@@ -29,11 +29,9 @@ _GAP = 5  # most steps from the last sample to the next period
 _DRIFT = 0.1  # drift a period that still closes, of a joint's range
 _LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
 _ALIKE = 0.2
-"""Excess of the mean square difference of a record from itself a period later over that several
-periods later, at most."""
+"""Excess of the difference of a record from itself one period later over several later, at most."""
 _REPEATED, _DRIFTS = 10.0, 4.0
-"""Ratio of the score of several periods to that of a long one with as many harmonics, and without a
-drift to that with one, at most: a part of a wave with noise looks like a drift."""
+"""Ratio of the score of several periods to that of a long one, and without a drift to with one."""
 _ROUGH = 6  # harmonics by which the period is told
 SEVERAL = 1.1  # periods from which a record holds more than one
 _STEP = 1e-5  # relative, of differences by the period
@@ -100,12 +98,8 @@ def fitted_gait(
     harmonics: int | None = None,
     degrees: bool = False,
 ) -> FittedGait:
-    """Fit a gait to joint angles.
-
-    `period`, in the unit of time of a file, is by default told from the samples, which may hold
-    several; `harmonics` are by default as many as the samples are worth; `degrees` holds for a file
-    where it does not name a unit.
-    """
+    """Fit a gait to joint angles; `period` is in the unit of time of a file, and `degrees` holds
+    where a file names no unit."""
     name, record = "the gait", None
     if isinstance(source, Fourier):
         angles = source.mean[:, None]
@@ -202,7 +196,7 @@ class _Samples(NamedTuple):
         return table, self.angles - table @ columns.T
 
     def scores(self, fit: _Fit, fewest: int, chosen: int) -> list[_Fit]:
-        """Fits of `fewest` to all harmonics of a fit, with `chosen` more numbers, by one QR."""
+        """Fits of `fewest` to all harmonics, with `chosen` more numbers, by one QR."""
         q = np.linalg.qr(fit.columns(self.time))[0]
         parts = q.T @ self.angles.T
         gains, left = (parts**2).sum(axis=1), ((self.angles.T - q @ parts) ** 2).sum()
@@ -274,8 +268,7 @@ class _Samples(NamedTuple):
         return min(fit for fit in candidates if fit.score <= enough)
 
     def find_repeats(self) -> list[tuple[float, float]]:
-        """Likely brackets of the period: least differences of the record from itself that much
-        later, by as many periods as there are."""
+        """Likely brackets of the period: least differences of the record from itself later."""
         step = self.step
         even = np.arange(0.0, self.time[-1], step)
         moved = np.array([np.interp(even, self.time, row - row.mean()) for row in self.angles])
@@ -327,10 +320,8 @@ class _Samples(NamedTuple):
         )
 
     def uncertainty(self, fit: _Fit) -> Uncertainty:
-        """Covariance of a least-squares fit, and of the period if it was told from the samples.
-
-        Harmonics up to twice the highest are in it, as large as the samples leave open.
-        """
+        """Covariance of the fit, of harmonics up to twice the highest, and of a period told from
+        the samples."""
         time, first = self.time, int(fit.drifts)
         most = min(time.size - first, round(fit.period / self.step))
         most = min(max((most - 1) // 2, fit.harmonics), _HIGHEST)

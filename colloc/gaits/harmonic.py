@@ -225,8 +225,7 @@ class Harmonic(LinearClass):
         return Fourier.from_table(table)
 
     def parameters(self, gait: Fourier) -> np.ndarray:
-        """Parameters of the member nearest to a series, after shifting its start phase if that is
-        free."""
+        """Of the member nearest to a series, after shifting its start phase if that is free."""
         gait = gait.resize(self.harmonics)
         if self.symmetry != BILATERAL:
             gait = shift_phase(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
@@ -240,8 +239,7 @@ class Harmonic(LinearClass):
         return self.symmetry == BILATERAL or bool(abs(gait.sin[0, 0]) < SAME_START)
 
     def through(self, gait: Any) -> Fourier:
-        """The Fourier series of a gait in its own phase, with the symmetry and harmonics of the
-        class; a series as it is."""
+        """The series of a gait in its own phase, with symmetry and harmonics of the class."""
         if isinstance(gait, Fourier):
             return gait
         half = symmetric_samples(gait, self.symmetry)

@@ -156,7 +156,6 @@ class LinearClass:
         self._basis(n_joint)
 
     def joint_map(self, n_joint: int) -> JointMap | None:
-        """The map from motors to joints, if several joints hang on one or some are stuck."""
         return None
 
     def motor_gait(self, gait: Any) -> Any:
@@ -220,8 +219,7 @@ class LinearClass:
         return self.member(parameters, n_joint)
 
     def angle_matrix(self, t: np.ndarray, n_joint: int, derivative: int = 0) -> np.ndarray:
-        """Joint angles per parameter at phases t, ``(n_time, n_joint, n_parameter)``, or their
-        derivatives per period."""
+        """Joint angles per parameter ``(n_time, n_joint, n_parameter)``, or derivatives."""
         functions = self.functions(t, derivative)
         basis = self._basis(n_joint).reshape(n_joint, functions.shape[0], -1)
         return np.einsum("wt,jwp->tjp", functions, basis)
@@ -260,8 +258,7 @@ class LinearClass:
         return True
 
     def through(self, gait: Any) -> Any:
-        """The gait that a search in the class begins with: the member nearest to a gait; of a path
-        without a phase, to its Fourier series."""
+        """The member nearest to a gait; of a path without a phase, to its Fourier series."""
         if self.relative_delta or getattr(gait, "basis", None) == self:
             return gait
         timed = gait if gait.is_series else self.series(_SERIES).through(gait)
@@ -280,8 +277,7 @@ class LinearClass:
         return self.member((2 * unit - 1) / self._sizes(n_joint), n_joint)
 
     def perturb(self, gait: Any, step: float, fall: int, rng: np.random.Generator) -> Any:
-        """Perturb the coefficients of a gait by normals of ``step`` [rad]; those of harmonic k, if
-        there are such, of ``step / k^fall``."""
+        """Perturb coefficients by normals of ``step`` [rad]; of harmonic k ``step / k^fall``."""
         v = self.parameters(self.through(gait))
         by = step * rng.normal(size=v.size) / self._sizes(gait.n_joint)
         return self.member(v + by, gait.n_joint)
@@ -297,8 +293,7 @@ def largest_coordinate(body: Body) -> float:
 
 
 def enclosed_area(gait_class: LinearClass, n_joint: int) -> np.ndarray:
-    """Quadratic form ``(n_parameter, n_parameter)`` of the area ``integral of sum_(i<j) (q_i dq_j -
-    q_j dq_i) / 2`` that a path encloses [rad^2]; 0 for retraced paths."""
+    """Quadratic form of the enclosed area ``integral of sum_(i<j) (q_i dq_j - q_j dq_i) / 2``."""
     instants = gait_class.instants
     angles, rates = (gait_class.angle_matrix(instants, n_joint, order) for order in (0, 1))
     sign = np.triu(np.ones((n_joint, n_joint)), 1)

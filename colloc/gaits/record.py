@@ -38,8 +38,7 @@ _WORDS = {
 _ROUNDED = 0.15  # share of unequal time steps from which equal steps were rounded
 _MOST = 5_000  # samples; of more, every second, third ... is taken
 _CENTRED = np.radians(20)
-"""All joints are centred within it of a right angle, or a straight one: so are servos that know no
-negative angles."""
+"""Servos that know no negative angles are centred within it of a right angle."""
 
 
 class Record(NamedTuple):
@@ -92,10 +91,7 @@ class _Column(NamedTuple):
 
 def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
     """Read joint angles over time from a text file, a line a sample; `degrees` holds where the file
-    does not name a unit.
-
-    `ProblemError`, with line, column and cure, if the file is no such record, or an ambiguous one.
-    """
+    does not name a unit."""
     table = read_table(path)
     check_size(path, table, FEWEST)
     columns, clock, joints, how = _columns(path, table, n_joint)
@@ -156,8 +152,7 @@ def _ends(columns: list[_Column]) -> str:
 def _columns(
     path: Path, table: Table, n_joint: int
 ) -> tuple[list[_Column], list[_Column], list[_Column], str]:
-    """All columns if they have names; that of times, or those of seconds and nanoseconds, if there
-    are any; those of the joints from tail to head, and by what they are known."""
+    """All named columns; those of times, if any; those of the joints, and how they are known."""
     if not table.names:
         width = table.values.shape[1]
         unnamed = [_Column(j, f"column {j + 1}") for j in range(width)]

@@ -26,16 +26,14 @@ from colloc.system.errors import ProblemError
 WAVES = -1.0
 """Waves along the body: towards the tail, which carries a body with mu_t > mu_f head first."""
 _SHARE, _LARGEST, _MOVING = 0.6, 1.5, 1.05
-"""Amplitude: a share of the largest admissible one, and at most so much [rad], or so many times the
-least that moves enough."""
+"""Amplitude: share of the largest, at most [rad], or times the least that moves enough."""
 _PHASES, _CHECKED = np.linspace(0.0, 1.0, 201), np.arange(2000) / 2000
 SAFE = 1 - 1e-3
 """Shapes as large as may be are scaled by this, to be clearly admissible."""
 _BISECTIONS = 21  # to a thousandth of the margin above
 _SLACK = 1e-6  # depth of a crossing that a certificate allows
 _AT_THE_BOUND = 1e-2
-"""Sampling cuts the corners of an optimum on the lower bound of the shape speed: it is still a good
-guess for a richer class."""
+"""Sampling cuts the corners of an optimum on the lower bound of the shape speed."""
 _MOVES = 1e-3  # shape speed, of a wave's, below which a class has nothing of the wave
 LATIN_HYPERCUBE, PERTURBED = "latin-hypercube", "perturbed"
 SAMPLERS = (LATIN_HYPERCUBE, PERTURBED)
@@ -51,8 +49,7 @@ _SPREAD = 0.3  # standard deviation of perturbed coefficients [rad]
 _ON_FLOOR = 1e-4
 _SHORT = 1.002  # a path on the lower bound of its length is shorter as a polyline
 _VISIBLE = np.pi / 20
-"""Least swing of a joint to either side [rad] that a person sees: a little more than that of one
-joint that moves alone at the default `Problem.smallest_shape_speed`."""
+"""Least swing of a joint to either side [rad] that a person sees."""
 _PERIOD = np.linspace(0.0, 1.0, 1001)
 _NEAR = 10.0
 """First delta of a search from a known optimum, of the final one: more prefers other gaits."""
@@ -61,8 +58,7 @@ _NEAR = 10.0
 def largest_factor(
     body: Body, joint_limit: Limit, angles: np.ndarray, rest: np.ndarray | float = 0.0
 ) -> float:
-    """The largest factor by which shapes ``(n_joint, n)``, less those at rest, can be multiplied
-    and stay admissible; inf for straight ones."""
+    """The largest factor that leaves shapes ``(n_joint, n)`` admissible; inf for straight ones."""
     angles = angles - rest
     stretched, joint_limit = under_one_limit(angles, joint_limit)
     peak = body.bounded_angles.largest(stretched).max()
@@ -84,8 +80,7 @@ def largest_factor(
 def travelling_wave(
     body: Body, joint_limit: Limit, waves: float = WAVES, least: float = 0.0
 ) -> Fourier:
-    """A wave along a body. If its shape speed were below `least` it is larger, and each joint bends
-    in proportion to its own limit."""
+    """A wave along a body; where it moves less than `least`, up to each joint's own limit."""
     cos, sin = body.wave(waves)
     unit = Fourier(np.zeros(body.n_joint), cos[:, None], sin[:, None])
     angles = unit.angles(_PHASES)
@@ -108,8 +103,7 @@ def largest_share(gait: Any, speeds: tuple[float, ...]) -> float:
 
 
 def initial_member(gait_class: Any, wave: Fourier) -> Any:
-    """The gait that stands for a wave in a class: itself, or the nearest member as fast, or if
-    there is none all its functions at once."""
+    """A wave in a class: itself, the nearest member as fast, or else all functions at once."""
     if gait_class.relative_delta or not gait_class.free or isinstance(gait_class, Harmonic):
         return wave
     member = gait_class.through(wave)
@@ -192,7 +186,7 @@ def largest_amplitude(problem: Any, gait: Any) -> float:
 
 
 def on_speed_floor(problem: Any, gait: Any) -> bool:
-    """True if a gait is as slow as ``smallest_shape_speed`` allows, which then decided its size."""
+    """True if a gait is as slow as is allowed, which then decided its size."""
     return gait.shape_speed < problem.smallest_shape_speed * (1 + _ON_FLOOR)
 
 
@@ -202,8 +196,7 @@ def is_visible(gait: Any) -> bool:
 
 
 def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndarray:
-    """Points ``(n, dimension)`` of the unit cube, one in every n-th of each coordinate, as those of
-    `scipy.stats.qmc`, which takes half a second to load."""
+    """Points ``(n, dimension)`` as of `scipy.stats.qmc`, which takes half a second to load."""
     within, order = rng.uniform(size=(n, dimension)), np.tile(np.arange(1, n + 1), (dimension, 1))
     for coordinate in order:
         rng.shuffle(coordinate)
@@ -211,8 +204,7 @@ def latin_hypercube(n: int, dimension: int, rng: np.random.Generator) -> np.ndar
 
 
 def latin_hypercube_gait(problem: Any, seed: int, start: int) -> Any:
-    """Start of a Latin hypercube over a problem's class of gaits that clearly moves, or the fastest
-    of many. `ProblemError` if no admissible gait is as fast as ``smallest_shape_speed``."""
+    """Start of a Latin hypercube over a class that clearly moves, or the fastest of many."""
     block, row = divmod(start, BLOCK)
     seeds, n_joint = problem.gait.start_class, problem.body.n_joint
     least = problem.smallest_shape_speed
@@ -261,8 +253,7 @@ def start_gait(problem: Any, sampler: str, seed: int, start: int) -> Any:
 
 def to_body(gait: Any, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> Any:
     """Transfer a gait of a chain to another body: every link gets the mean tangent angle of the
-    part of the body it covers. Where links would cross, or a joint pass its limit, all angles
-    shrink."""
+    part of the body it covers, and all angles shrink until they are admissible."""
     matrix = other.from_chain(np.array(body.lengths))
     angles = matrix @ gait.angles(_PERIOD)
     return gait.mapped(matrix * min(1.0, largest_factor(other, joint_limit, angles)))
@@ -275,8 +266,7 @@ def to_class(
     joint_limit: Limit = float(np.pi),
     smallest_shape_speed: float = 0.1,
 ) -> Any:
-    """Transfer a gait to a class, and make it admissible: a truncated series overshoots, and cuts
-    corners."""
+    """Transfer a gait to a class: a truncated series overshoots, and cuts corners."""
     start = gait_class.through(gait)
     growth = 2 * np.pi * smallest_shape_speed / start.length
     if growth > _SHORT:
@@ -289,8 +279,7 @@ def to_class(
 
 
 def prolong(problem: Any, gait: Any, gait_class: Any, **changes: object) -> Any:
-    """The problem in another class of gaits, to be searched from a known optimum of any class;
-    delta stays what it is relative to the shape speed."""
+    """The problem in another class, from a known optimum, with delta as to the shape speed."""
     relative = problem.delta / (1.0 if problem.gait.relative_delta else problem.guess.length)
     delta = relative * (1.0 if gait_class.relative_delta else gait.length)
     guess = to_class(

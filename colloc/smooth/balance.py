@@ -56,8 +56,7 @@ class Motion:
 
 @lru_cache(maxsize=1024)
 def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, ...]:
-    """Nodes to whole panels, panels to their nodes, and the integrals from a panel's left end to
-    its nodes."""
+    """Nodes to panels, panels to nodes, and integrals from a panel's left end to its nodes."""
     unit = scheme(f"gauss-{order}")
     each = sparse.identity(n, format="csc")
     return tuple(sparse.kron(each, part, "csc") for part in (unit.b, np.ones((order, 1)), unit.A))
@@ -96,8 +95,7 @@ class PanelGrid:
         return np.tile(self.gauss.b, self.n)[:, None] * self.widths
 
     def integrate(self, integrand: Array, reference: int) -> Array:
-        """Integrals from edge `reference` to the nodes; the integrand ``(n_node, n_time)`` is times
-        the panel widths."""
+        """Integrals from edge `reference` to the nodes, of an integrand times the widths."""
         matmul = namespace(integrand).matmul
         whole, spread, inside = _panel_matrices(self.n, self.order)
         ahead, ones = np.arange(self.n) >= reference, np.ones((self.n, self.n))
@@ -160,8 +158,8 @@ def force_density(body: Curve, tangential: Array, normal: Array) -> tuple[Array,
 
 
 def resultant(body: Curve, tangential: Array, normal: Array) -> Array:
-    """Net force and torque about the reference of a force per length, ``(3, n_time)`` (paper, eq.
-    ftb); of the velocity of the nodes, that of the centre of mass first."""
+    """Net force and torque about the reference ``(3, n_time)`` (paper, eq. ftb); of velocities
+    that of the centre of mass."""
     xp = namespace(body.cos, tangential)
     parts = force_density(body, tangential, normal)
     return xp.stack([xp.sum_rows(body.weight * part) for part in parts])
@@ -225,8 +223,7 @@ class PanelBatch:
         return np.hypot(*node_velocity(self.curve, z))
 
     def panel_speed(self, z: np.ndarray) -> np.ndarray:
-        """Largest speed of a node in each panel, ``(n_panel, n)``; infinite for panels of width
-        zero."""
+        """Largest speed of a node in each panel; infinite for panels of width zero."""
         speed = self.node_speed(z).reshape(self.panels.n, -1, z.shape[1]).max(axis=1)
         return np.where(np.diff(self.panels.edges, axis=0) > 0, speed, np.inf)
 

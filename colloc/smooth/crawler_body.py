@@ -109,8 +109,7 @@ class CrawlerBody(SmoothBody):
 
     @cached_property
     def _powers(self) -> np.ndarray:
-        """Coefficients of x^k in the polynomials times (1 - x^2)^3, ``(modes, modes)``, k along the
-        rows."""
+        """Coefficients of x^k, along the rows, in the polynomials times (1 - x^2)^3."""
         powers = np.zeros((self.modes, self.modes))
         for m, unit in enumerate(np.eye(self.modes)):
             powers[: m + 1, m] = np.polynomial.chebyshev.cheb2poly(unit[: m + 1])
@@ -196,15 +195,13 @@ class CrawlerBody(SmoothBody):
         return np.stack([np.interp(at, np.arange(5), row) for row in corners])
 
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
-        """A bump that travels as often to and fro as it grows, the even profile a quarter of a
-        period after the odd one."""
+        """A bump that travels as often as it grows, the even profile a quarter period later."""
         cos, sin = np.zeros((2, self.n_joint))
         cos[0], sin[1], cos[2] = LAP, np.sign(waves), 1.0
         return cos, sin
 
     def from_chain(self, lengths: np.ndarray) -> np.ndarray:
-        """A chain's bends pressed into the bump, as nearly as its profiles can, at the front end of
-        the region."""
+        """A chain's bends pressed into the bump at the front end of the region."""
         ends, n = np.append(0.0, np.cumsum(lengths)) / np.sum(lengths), len(lengths)
         link = np.clip(np.searchsorted(ends, 0.5 * (_PLACES + 1)) - 1, 0, n - 1)
         stairs = np.tril(np.ones((n, n - 1)), -1)[link]

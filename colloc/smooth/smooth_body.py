@@ -157,8 +157,7 @@ def accurate_motion(
     delta: float,
     start: np.ndarray | None,
 ) -> tuple[BalancedMotion, np.ndarray]:
-    """The motion for a certificate, and its residual ``(n_time,)``: of smooth bodies on panels that
-    adapt, whatever those of a search."""
+    """The motion for a certificate, of smooth bodies on panels that adapt, and its residual."""
     if isinstance(body, SmoothBody):
         slid = body.on_panels(friction, angles, rates, delta).require()
         motion = BalancedMotion(slid.z, slid.centre, slid.power, slid.bending_power)
