@@ -86,7 +86,8 @@ def guess_in_balance(problem):
     from colloc.verification.replay import replay
 
     program = program_of(problem)
-    x = program.feasible(problem.gait.parameters(problem.guess), problem.delta)
+    parameters = program.control.admissible.parameters(problem.guess)
+    x = program.feasible(parameters, problem.delta)
     gait, mesh, x = program.member(x), program.mesh, x[: program.layout.n]
     fine = replay(
         problem.body,
