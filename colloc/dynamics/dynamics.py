@@ -440,7 +440,7 @@ class Inertial(QuasiStatic):
             out, found = self._rates(shapes, states, froude)
             return found
 
-        states, _, held = equations.solve_natural(rates, first, near)
+        states, _, held = equations.solve(rates, first, near)
         return states, out, held
 
     def alone(

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
-
 import numpy as np
 
 from colloc.dynamics.collocated import CollocatedPose, point_weights
@@ -33,51 +30,31 @@ _FIRST, _FASTEST, _FARTHEST = 0.3, 10.0, np.log(5.0)
 nobody is slow; and the farthest step between the logarithms of two."""
 
 
-class Played(NamedTuple):
-    """A period of a gait played at some pace, and its states at the points of the mesh, ``(n_state,
-    n_point)``. Its distance is the chord of the arc that it crawls, which does not depend on the
-    phase at which it begins (`colloc.gaits.period`)."""
-
-    efficiency: float
-    states: np.ndarray
-
-
-class GaitOnMesh:
-    """A gait of a chain at the points of a mesh, to be played at any pace.
-
-    Parameters
-    ----------
-    body, friction, gait
-    mesh
-        Of a scheme whose neighbouring intervals share no stage, such as `SCHEME`.
-    """
-
-    def __init__(self, body: Chain, friction: Law, gait: Path, mesh: Mesh) -> None:
-        self._body, self._friction, self._mesh, self.times = body, friction, mesh, mesh.times
-        self._angles, self._rates = gait(self.times)
-
-    def play(self, delta: float, froude: float = 0.0, near: Played | None = None) -> Played:
-        """The motion in which all periods are alike, sought near another one with inertia, or the
-        slow one.
-
-        Raises
-        ------
-        NotConvergedError
-            If none is found.
-        """
-        kind = Inertial if froude else QuasiStatic
-        dynamics = kind(self._body, self._friction, Regime(froude=froude))
-        states = None if near is None or not near.states.size else near.states
-        shapes = Shapes(self._angles, self._rates, delta)
-        along = dynamics.simulate(self._mesh, shapes, np.empty(0), states)
-        if not along.held.all():
-            raise NotConvergedError(
-                f"at a Froude number of {froude:g} no motion was found in which all periods are "
-                f"alike."
-            )
-        turn, work = point_weights(self._mesh) @ np.array([along.now.z[OMEGA], along.now.power]).T
-        pose = CollocatedPose.on_mesh(self._mesh, along.now.z[OMEGA] - turn, along.now.centre)
-        return Played(chord_per_way(turn) * float(abs(pose.place[-1]) / work), along.states)
+def played(
+    body: Chain,
+    friction: Law,
+    gait: Path,
+    mesh: Mesh,
+    delta: float,
+    froude: float = 0.0,
+    near: np.ndarray | None = None,
+) -> tuple[float, np.ndarray | None]:
+    """Efficiency of a gait in the motion in which all periods are alike, and its states at the
+    points of a mesh whose neighbours share no stage, sought near others or those of the slow
+    motion. The distance is the chord of the arc, which does not depend on the phase at which a
+    period begins (`colloc.gaits.period`). `NotConvergedError` if no motion is found."""
+    kind = Inertial if froude else QuasiStatic
+    angles, rates = gait(mesh.times)
+    shapes = Shapes(angles, rates, delta)
+    along = kind(body, friction, Regime(froude=froude)).simulate(mesh, shapes, np.empty(0), near)
+    if not along.held.all():
+        raise NotConvergedError(
+            f"at a Froude number of {froude:g} no motion was found in which all periods are alike."
+        )
+    turn, work = point_weights(mesh) @ np.array([along.now.z[OMEGA], along.now.power]).T
+    pose = CollocatedPose.on_mesh(mesh, along.now.z[OMEGA] - turn, along.now.centre)
+    efficiency = chord_per_way(turn) * float(abs(pose.place[-1]) / work)
+    return efficiency, along.states if froude else None
 
 
 def slow_enough(
@@ -128,46 +105,29 @@ def slow_enough(
     check_finite(positive=True, loss=loss, delta=delta)
     if loss > 0.5:
         raise ProblemError(f"loss must be at most 0.5, not {loss!r}.")
-    chain, accurate = checked_mass(body), _ACCURACY
+    chain = checked_mass(body)
     law = chain.law(friction)
     if not rate_independent(law):
         raise ProblemError(
             f"under {law.label} the pace is part of every gait: how slow is slow enough has no one "
             f"answer."
         )
-    return _on_refined_mesh(
-        chain,
-        law,
-        gait,
-        breaks,
-        lambda on_mesh: _froude(on_mesh, law, delta, loss),
-        lambda froude: accurate * froude,
-    )
-
-
-def _on_refined_mesh(
-    body: Chain,
-    friction: Law,
-    gait: Path,
-    breaks: np.ndarray | tuple[float, ...],
-    number: Callable[[GaitOnMesh], float],
-    allowed: Callable[[float], float],
-) -> float:
-    """A number on the first mesh on which it changes by less than is allowed."""
     known = np.nan
     for intervals in _INTERVALS * 2 ** np.arange(_DOUBLED):
         edges = np.union1d(np.linspace(0.0, 1.0, intervals + 1), np.asarray(breaks, dtype=float))
-        before, known = known, number(GaitOnMesh(body, friction, gait, Mesh(scheme(SCHEME), edges)))
-        if abs(known - before) < allowed(known):
+        mesh = Mesh(scheme(SCHEME), edges)
+        before, known = known, _froude(chain, law, gait, mesh, delta, loss)
+        if abs(known - before) < _ACCURACY * known:
             return known
     raise NotConvergedError(
         "finer and finer meshes do not agree on what inertia does to this gait; try a larger delta."
     )
 
 
-def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float:
+def _froude(body: Chain, friction: Law, gait: Path, mesh: Mesh, delta: float, loss: float) -> float:
     """Froude number at which inertia first changes the efficiency by the part `loss`."""
-    last = slow = gait.play(delta)
+    at_pace = body, friction, gait, mesh, delta
+    slow, states = played(*at_pace)
     # the change is a power of the Froude number where both are small
     low = -np.inf
     high = np.log(_FASTEST * friction.largest)
@@ -175,8 +135,8 @@ def _froude(gait: GaitOnMesh, friction: Law, delta: float, loss: float) -> float
     fastest, power = high, _POWER
     tried: list[tuple[float, float]] = []
     while high - low > _ACCURACY / _POWER:
-        last = gait.play(delta, float(np.exp(at)), last)
-        more = float(np.log(max(abs(1.0 - last.efficiency / slow.efficiency), 1e-12) / loss))
+        efficiency, states = played(*at_pace, float(np.exp(at)), states)
+        more = float(np.log(max(abs(1.0 - efficiency / slow), 1e-12) / loss))
         if abs(more) < _ACCURACY:
             return float(np.exp(at))
         low, high = (at, high) if more < 0.0 else (low, at)

@@ -24,8 +24,6 @@ from colloc.numerics.mesh import Mesh
 _CLOSED, _STEPS = 1e-12, 200
 _ROUNDED = 1e-11
 """Newton step that counts as none where steep rates leave rounding."""
-_SHARES, _ASTRAY = 0.5 ** np.arange(7), 5
-"""Damping factors; steps in a row without descent before giving up."""
 _LEAST_SHARE = 1 / 16
 """Give up if the damping factor falls below this."""
 _FAR = np.errstate(over="ignore", invalid="ignore")
@@ -43,15 +41,9 @@ class Rates(NamedTuple):
 class CollocatedStates:
     """Equations of states on a mesh whose neighbours share no stage.
 
-    Parameters
-    ----------
-    mesh
-    free : (n_state,), optional
-        States that close a period; the others start where they are told to.
-    image : (n_state, n_state), optional
-        Map from the start of the free states to their end; identity by default.
-    unit
-        Rates are per time over this.
+    free: the states that close a period, ``(n_state,)``; the others start where they are told to.
+    image: map ``(n_state, n_state)`` from the start of the free states to their end; identity by
+    default. unit: rates are per time over this.
     """
 
     def __init__(
@@ -85,39 +77,15 @@ class CollocatedStates:
         start: np.ndarray,
         near: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """States, start and convergence of a damped Newton's method with monotone residual; `start`
-        ``(n_state,)`` is the begin (of free states a guess), `near` ``(n_state, n_point)`` an
-        initial guess."""
-        x = self._initial_guess(start, near)
-        now, residual, off = self._residual(rates, x)
-        astray = 0
-        for _ in range(_STEPS):
-            if off < _CLOSED or not now.known:
-                break
-            step = self._newton(now.on_states)(residual)
-            if not np.isfinite(step).all():
-                break
-            if np.abs(step).max() < _ROUNDED:
-                off = 0.0
-                break
-            for share in _SHARES:
-                trial = x - share * step
-                now, residual, off_then = self._residual(rates, trial)
-                if off_then < off:
-                    break
-            astray = 0 if off_then < off else astray + 1
-            if astray > _ASTRAY:
-                break
-            x, off = trial, off_then
-        return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
-
-    def solve_natural(
-        self, rates: Callable[[np.ndarray], Rates], start: np.ndarray, near: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Newton's method damped as in NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear
-        Problems*, 3.3): a step is accepted if the next one, with the same derivatives, is shorter.
-        For momenta, whose residual may grow on the way under steep friction."""
-        x = self._initial_guess(start, near)
+        """States ``(n_state, n_point)``, start and convergence of Newton's method, damped as in
+        NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear Problems*, 3.3): a step is accepted if
+        the next one, with the same derivatives, is shorter. Residuals may grow on the way under
+        steep friction. `start` ``(n_state,)`` is the begin (of free states a guess), `near` a guess
+        of the states."""
+        start = np.array(start, dtype=float)
+        if near is None:
+            near = np.repeat(start[:, None], np.prod(self._shape), axis=1)
+        x = np.column_stack([near, start])
         now, residual, off = self._residual(rates, x)
         next_step, trusted = np.zeros_like(x), np.inf
         for _ in range(_STEPS):
@@ -142,25 +110,17 @@ class CollocatedStates:
                 closer = 0.25 * share
                 if now.known:
                     next_step = newton(residual)
-                    trusted = share * size * float(np.linalg.norm(next_step))
-                    if np.linalg.norm(next_step) < size:
+                    next_size = float(np.linalg.norm(next_step))
+                    trusted = share * size * next_size
+                    if next_size < size:
                         break
-                    closer = (
-                        0.5
-                        * share**2
-                        * size
-                        / float(np.linalg.norm(next_step - (1.0 - share) * step))
-                    )
+                    curved = float(np.linalg.norm(next_step - (1.0 - share) * step))
+                    closer = 0.5 * share**2 * size / curved
                 if share <= _LEAST_SHARE:
                     return trial[:, :-1], trial[:, -1], False
                 share = max(_LEAST_SHARE, min(closer, 0.5 * share))
             x = trial
         return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
-
-    def _initial_guess(self, start: np.ndarray, near: np.ndarray | None) -> np.ndarray:
-        start = np.array(start, dtype=float)
-        states = np.repeat(start[:, None], np.prod(self._shape), axis=1) if near is None else near
-        return np.column_stack([states, start])
 
     def alone(
         self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray
@@ -170,24 +130,27 @@ class CollocatedStates:
         n, s = self._shape
         begin, share = np.repeat(begins, s, axis=1), np.ones(n)
 
+        def by_interval(values: np.ndarray) -> np.ndarray:
+            """Largest magnitude, ``(n,)``."""
+            largest: np.ndarray = np.abs(values).reshape(-1, n, s).max(axis=(0, 2))
+            return largest
+
         def residual(states: np.ndarray) -> tuple[Rates, np.ndarray, np.ndarray]:
             now = rates(states)
-            left_over = (
-                states - begin - self._within(now.value.reshape(-1, n, s)).reshape(states.shape)
-            )
-            return now, left_over, np.abs(left_over).reshape(-1, n, s).max(axis=(0, 2))
+            gained = self._within(now.value.reshape(-1, n, s)).reshape(states.shape)
+            left_over = states - begin - gained
+            return now, left_over, by_interval(left_over)
 
         (now, left_over, off), states = residual(near), near
         for _ in range(_ALONE):
             if (off < _CLOSED).all():
                 break
             linear = _Linear(self._a, self._b, now.on_states)
-            step = np.repeat(share, s) * linear.at_points(
-                linear.own(left_over), np.zeros_like(begins.T)
-            )
+            own = linear.at_points(linear.own(left_over), np.zeros_like(begins.T))
+            step = np.repeat(share, s) * own
             trial = states - step
             *_, off_then = residual(trial)
-            nearer = (off_then < off) | (np.abs(step).reshape(-1, n, s).max(axis=(0, 2)) < _ROUNDED)
+            nearer = (off_then < off) | (by_interval(step) < _ROUNDED)
             states = np.where(np.repeat(nearer, s), trial, states)
             share = np.where(nearer, np.minimum(2.0 * share, 1.0), 0.25 * share)
             now, left_over, off = residual(states)
@@ -204,13 +167,10 @@ class CollocatedStates:
         states, start = x[:, :-1], x[:, -1]
         now = rates(states)
         gained, whole = self.integrals(now.value)
-        residual = np.column_stack([states - start[:, None] - gained, whole + self._closure(start)])
+        end = start if self._image is None else self._image @ start
+        residual = np.column_stack([states - start[:, None] - gained, whole + (start - end)])
         off = max(np.abs(residual[:, :-1]).max(), np.abs(residual[self._free, -1]).max(initial=0.0))
         return now, residual, float(off) if now.known else np.inf
-
-    def _closure(self, start: np.ndarray) -> np.ndarray:
-        """``s_0 - M s_0``."""
-        return start - (start if self._image is None else self._image @ start)
 
     @_FAR
     def _newton(self, on_states: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
@@ -222,12 +182,10 @@ class CollocatedStates:
             own, through, gained = within.handed_on(residual[:, :-1])
             start = np.zeros(len(residual))
             if free.size:
-                start[free] = np.linalg.solve(
-                    self._open(through[-1]), residual[free, -1] - gained[-1, free]
-                )
-            return np.column_stack(
-                [within.at_points(own, through[:-1] @ start + gained[:-1]), start]
-            )
+                off = residual[free, -1] - gained[-1, free]
+                start[free] = np.linalg.solve(self._open(through[-1]), off)
+            begins = through[:-1] @ start + gained[:-1]
+            return np.column_stack([within.at_points(own, begins), start])
 
         return step
 
@@ -246,15 +204,12 @@ class CollocatedStates:
         within = _Linear(self._a, self._b, on_states)
         on_start, on_rates, on_ends = within.vjp(of_states)
         if self._free.size:
-            free = self._free
-            through, *_ = within.vjp(
-                np.zeros((on_start.shape[1], *of_states.shape[1:])), np.eye(on_start.shape[1])
-            )
+            free, k = self._free, on_start.shape[1]
+            through, *_ = within.vjp(np.zeros((k, *of_states.shape[1:])), np.eye(k))
             closing = np.zeros_like(on_start)
             closing[:, free] = -np.linalg.solve(self._open(through).T, on_start[:, free].T).T
-            image = np.eye(len(through)) if self._image is None else self._image
             on_start, on_rates, on_ends = within.vjp(of_states, closing)
-            on_start -= closing @ image
+            on_start -= closing @ (np.eye(k) if self._image is None else self._image)
         return on_start, on_rates, on_ends
 
 

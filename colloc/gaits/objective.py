@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from colloc.mechanics.densities import INTEGRALS, Quantity, quantities_of
-from colloc.numerics.expression import Formula, formula
+from colloc.numerics.expression import formula
 from colloc.system.arguments import is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
 
@@ -88,47 +88,38 @@ class Objective:
         names = {expression: name for name, expression in NAMED.items()}
         object.__setattr__(self, "expression", stated.text)
         object.__setattr__(self, "name", self.name or names.get(stated.text, stated.text))
-        self._check_values()
-
-    def _check_values(self) -> None:
         try:
             with np.errstate(all="ignore"):
                 values = [self(sample) for sample in self._samples]
                 partials = [self.partials(sample) for sample in self._samples]
         except (ArithmeticError, TypeError, ValueError):
             values, partials = [np.nan], [{}]
+        steepest = [max(map(abs, each.values()), default=np.nan) for each in partials]
         if not all(isinstance(value, float) and np.isfinite(value) for value in values):
-            raise ProblemError(
-                f"the objective {self.expression!r} has no value for a usual gait: "
-                f"{self._samples[0]}."
+            wrong = f"has no value for a usual gait: {self._samples[0]}"
+        elif not all(_FLATTEST < slope < 1 / _FLATTEST for slope in steepest):
+            wrong = "does not tell usual gaits apart: it is too flat or too steep"
+        elif min(each.get("distance", 0.0) for each in partials) < 0:
+            wrong = (
+                "falls with the distance; a body counts its distance in the direction in which it "
+                "moves, so it can only be asked to go far"
             )
-        if not all(_FLATTEST < max(map(abs, each.values())) < 1 / _FLATTEST for each in partials):
-            raise ProblemError(
-                f"the objective {self.expression!r} does not tell usual gaits apart: it is too "
-                f"flat or too steep."
-            )
-        if min(each.get("distance", 0.0) for each in partials) < 0:
-            raise ProblemError(
-                f"the objective {self.expression!r} falls with the distance; a body counts its "
-                f"distance in the direction in which it moves, so it can only be asked to go far."
-            )
+        else:
+            return
+        raise ProblemError(f"the objective {self.expression!r} {wrong}.")
 
     def __call__(self, period: Mapping[str, Any]) -> Any:
         """The value for quantities of a period: floats or CasADi's symbols."""
-        value = self._formula(period)
+        value = formula(self.expression, self._names)(period)
         return float(value) if isinstance(value, np.ndarray) else value
 
     @property
-    def _formula(self) -> Formula:
-        return formula(self.expression, self._names)
-
-    @property
-    def _known_word(self) -> dict[str, Quantity]:
+    def _integrals(self) -> dict[str, Quantity]:
         return INTEGRALS | {each.name: each for each in self.quantities}
 
     @property
     def _names(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys([*QUANTITIES, *self._known_word]))
+        return tuple(dict.fromkeys([*QUANTITIES, *self._integrals]))
 
     @property
     def _samples(self) -> list[dict[str, float]]:
@@ -138,12 +129,13 @@ class Objective:
     @cached_property
     def uses(self) -> tuple[str, ...]:
         """Names of its variables, in the order of `QUANTITIES`, its own last."""
-        return tuple(name for name in self._names if name in self._formula.names)
+        stated = formula(self.expression, self._names).names
+        return tuple(name for name in self._names if name in stated)
 
     @cached_property
     def integrals(self) -> tuple[Quantity, ...]:
         """Its variables that are integrals of functions of an instant."""
-        return tuple(self._known_word[name] for name in self.uses if name in self._known_word)
+        return tuple(self._integrals[name] for name in self.uses if name in self._integrals)
 
     @cached_property
     def degree(self) -> float | None:
@@ -169,7 +161,8 @@ class Objective:
 
     def partials(self, period: Mapping[str, float]) -> dict[str, float]:
         """Derivative with respect to each of its variables."""
-        partials = self._formula.partials({name: period[name] for name in self.uses})
+        stated = formula(self.expression, self._names)
+        partials = stated.partials({name: period[name] for name in self.uses})
         return {name: float(partials[name]) for name in self.uses}
 
     def shares(self, period: Mapping[str, float]) -> dict[str, float]:

@@ -12,13 +12,13 @@ import numpy as np
 from colloc.gaits import gait_fields
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each
+from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each, range_of
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.regime import LEVEL, Free, Regime, regime_of
 from colloc.gaits.starts import check_guess, default_guess
-from colloc.gaits.symmetry import ANTIPODAL, NONE, check_symmetric, fraction
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, fraction
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain, formulations
 from colloc.mechanics.contact import crossing_depth
@@ -46,7 +46,7 @@ from colloc.system.files import check_name
 
 SMALLEST_DELTA = 1e-14  # differences of speeds of order 1 are rounded to less
 LARGEST_DELTA = 1e3  # body lengths per period, far above the speeds of any gait
-MOST_COORDINATES = 100
+MOST_INTERVALS, MOST_COORDINATES = 100_000, 100
 """Contact is checked in every pair of links at thousands of phases, which takes 10 s at so many."""
 
 
@@ -181,14 +181,22 @@ class Problem:
                 f"allowed: fewer links, or a smooth body of a few modes, come near it."
             )
         check_kind("body", self.body, gait_fields.BODIES, Body)
-        stages, usual = schedule(self.body), self.body.defaults
-        self._fill(gait=Prescribed(stages, self.body.symmetries[0]) if stages else Harmonic())
-        self._check_parts()
+        stages, usual, n_joint = schedule(self.body), self.body.defaults, self.body.n_joint
+        own = Prescribed(stages, self.body.symmetries[0]) if stages else Harmonic()
+        self._fill(gait=own)
+        check_name(self.name)
+        check_kind("friction", self.friction, gait_fields.LAWS, Law)
+        check_kind("gait", self.gait, gait_fields.CLASSES, LinearClass)
+        motion = LEVEL if self.motion is None else self.motion
+        check_kind("motion", motion, [Regime, *gait_fields.MOTIONS])
+        if self.gait.free == bool(stages):
+            what = "a prescribed motion has no class of gaits"
+            what = what if self.gait.free else "this body's motion is not prescribed"
+            raise ProblemError(f"{what}; leave gait out, or take another body.")
         self._set(objective=objective_from(self.objective), at_least=least_values(self.at_least))
         regime, froude = self.regime, self.froude
-        paces = isinstance(froude, (list, tuple))
-        self._set(froude=Free(*map(float, froude)) if paces else float(froude))  # type: ignore[arg-type]
         start = regime.delta_start(self.gait) or usual.delta_start
+        self._set(froude=Free(*map(float, froude)) if isinstance(froude, (list, tuple)) else froude)
         self._fill(
             delta=usual.delta,
             delta_start=start if self.law.regularised else usual.delta,
@@ -196,30 +204,25 @@ class Problem:
             formulation=formulations(self.body)[0],
             intervals=self.usual_intervals,
         )
-        self._check_numbers()
+        self._check_discretisation()
+        limits = self.limits if isinstance(self.limits, Iterable) else (self.limits,)
         self._set(
             delta_start=max(self.delta, self.delta_start),
             joint_limit=checked_limit(self.body, self.joint_limit),
-        )
-        self._check_discretisation()
-        self._check_aims()
-        limits = self.limits if isinstance(self.limits, Iterable) else (self.limits,)
-        motor_limits = ("torque_limit", "power_limit", "speed_limit")
-        self._set(
+            limits=tuple(map(stated_limit, limits)),
             **{
                 name: checked_actuator_limit(name, getattr(self, name), self.n_motor)
-                for name in motor_limits
-            }
+                for name in ("torque_limit", "power_limit", "speed_limit")
+            },
         )
-        self._set(limits=tuple(map(stated_limit, limits)))
-        self._check_actuators()
+        self._check_aims()
         regime.check(self)
         self._check_gaits()
         bounds = self.joint_limit, self.largest_speeds, self.smallest_shape_speed
         if self.guess is None and self.gait.free:
             self._set(guess=default_guess(self.body, self.gait, *bounds))
         elif self.guess is None:
-            self._set(guess=self.gait.member(np.empty(0), 2))
+            self._set(guess=self.gait.member(np.empty(0), n_joint))
         check_kind("guess", self.guess, gait_fields.GAITS)
         check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
 
@@ -230,51 +233,31 @@ class Problem:
     def _fill(self, **defaults: object) -> None:
         self._set(**{name: x for name, x in defaults.items() if getattr(self, name) is None})
 
-    def _check_parts(self) -> None:
-        check_name(self.name)
-        check_kind("friction", self.friction, gait_fields.LAWS, Law)
-        check_kind("gait", self.gait, gait_fields.CLASSES, LinearClass)
-        motion = LEVEL if self.motion is None else self.motion
-        check_kind("motion", motion, [Regime, *gait_fields.MOTIONS])
-        if self.gait.free == bool(schedule(self.body)):
-            what = (
-                "a prescribed motion has no class of gaits"
-                if self.gait.free
-                else "this body's motion is not prescribed"
-            )
-            raise ProblemError(f"{what}; leave gait out, or take another body.")
-
-    def _check_numbers(self) -> None:
-        numbers = ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance")
-        check_finite(**{name: getattr(self, name) for name in numbers})
-        if self.delta <= 0:
-            raise ProblemError(f"delta must be positive, not {self.delta:g}; the paper uses 1e-4.")
-        if self.delta < SMALLEST_DELTA:
-            raise ProblemError(
-                f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: speeds of that "
-                f"order are lost in rounding. "
-                "The paper uses 1e-4, and a certificate states the efficiency for delta -> 0."
-            )
-        if max(self.delta, self.delta_start) > LARGEST_DELTA:
-            raise ProblemError(
-                f"delta and delta_start must be at most {LARGEST_DELTA:g}: at such speeds friction "
-                f"would be viscous."
-            )
-
     def _check_discretisation(self) -> None:
+        ranges = {
+            "delta": (SMALLEST_DELTA, LARGEST_DELTA),
+            "delta_start": (0.0, LARGEST_DELTA),
+            "smallest_shape_speed": (np.finfo(float).tiny, np.inf),
+        }
+        check_finite(mesh_tolerance=self.mesh_tolerance, **{x: getattr(self, x) for x in ranges})
+        for name, (least, most) in ranges.items():
+            value = getattr(self, name)
+            if value <= 0:
+                raise ProblemError(f"{name} must be positive, not {value:g}.")
+            if not least <= value <= most:
+                bound = f"at least {least:g}" if value < least else f"at most {most:g}"
+                raise ProblemError(
+                    f"{name} must be {bound}, not {value:g}: slower speeds are lost in rounding, "
+                    f"faster ones make friction viscous. The paper uses 1e-4, and a certificate "
+                    f"states the efficiency for delta -> 0."
+                )
         if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
             raise ProblemError(
                 f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}."
             )
-        if self.smallest_shape_speed <= 0:
-            raise ProblemError(
-                f"smallest_shape_speed must be positive, not {self.smallest_shape_speed:g}."
-            )
         if self.formulation not in formulations(self.body):
             known = ", ".join(formulations(self.body))
             raise ProblemError(f"formulation must be one of {known}, not {self.formulation!r}.")
-        if not is_whole(self.intervals):
-            raise ProblemError(f"intervals must be a whole number, not {self.intervals!r}.")
         collocation = scheme(self.scheme)
         if self.gait.relative_delta and collocation.left:
             raise ProblemError(
@@ -282,14 +265,10 @@ class Problem:
                 f"{self.scheme}."
             )
         fewest, what = self.gait.fewest_intervals(collocation.s - collocation.left)
-        if self.intervals < fewest:
+        if not is_whole(self.intervals, fewest, MOST_INTERVALS):
             raise ProblemError(
-                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot "
-                f"resolve {what}; use at least {fewest}."
-            )
-        if self.intervals > 100_000:
-            raise ProblemError(
-                f"the mesh is too large: {self.intervals} intervals; use at most 100000."
+                f"intervals must be a whole number from {fewest}, which resolve {what} by "
+                f"{self.scheme}, to {MOST_INTERVALS}, not {self.intervals!r}."
             )
 
     def _check_aims(self) -> None:
@@ -310,18 +289,14 @@ class Problem:
                 f"no {self.gait.symmetry} gait turns the body: rotation must be 0, or the class "
                 f"without symmetry."
             )
-        if not self.gait.free and (
-            self.objective != EFFICIENCY or self.at_least or self.speed_limit is not None
-        ):
+        asked = self.objective != EFFICIENCY or self.at_least or self.speed_limit is not None
+        if asked and not self.gait.free:
             raise ProblemError(
                 "nothing is free in a prescribed motion; leave objective, at_least and "
                 "speed_limit out."
             )
-
-    def _check_actuators(self) -> None:
-        limits = self.path_limits
         forced = [each.name for each in self.integrals if each.needs_forces]
-        forced += [f"a limit on the {each.name}" for each in limits.each]
+        forced += [f"a limit on the {each.name}" for each in self.path_limits.each]
         if forced and self.formulation != FULL:
             raise ProblemError(
                 f"{forced[0]} needs the forces on the body's parts: a chain, and the formulation "
@@ -337,7 +312,22 @@ class Problem:
 
     def _check_gaits(self) -> None:
         """Raise a `ProblemError` if the body has no such gaits, or none that goes anywhere."""
-        check_symmetric(self)
+        gaits, symmetry = self.gait, self.gait.symmetry
+        if symmetry not in self.body.symmetries:
+            raise ProblemError(
+                f"gaits of symmetry {symmetry} need a body whose lengths, weights and feet read "
+                f"the same from both ends; gaits of this one may have the symmetry "
+                f"{' or '.join(self.body.symmetries)}."
+            )
+        for name in ("joint_limit", "torque_limit", "power_limit", "speed_limit"):
+            limit = getattr(self, name)
+            each = [range_of(joint) for joint in limit] if isinstance(limit, tuple) else []
+            order = -1 if symmetry == BILATERAL else 1
+            if symmetry != NONE and each != [(-high, -low) for low, high in each[::order]]:
+                alike = "mirrored joints" if symmetry == BILATERAL else "to both sides"
+                raise ProblemError(
+                    f"gaits of symmetry {symmetry} bend {alike} alike: give them the same {name}."
+                )
         if self.joint_map is not None:
             if not isinstance(self.body, Chain):
                 raise ProblemError(
@@ -345,18 +335,16 @@ class Problem:
                 )
             if crossing_depth(self.body, self.joint_map.offset).any():
                 raise ProblemError("links cross where joints are stuck.")
-        self.gait.check_joints(self.body.n_joint)
-        if self.gait.relative_delta and self.paced_by:
+        gaits.check_joints(self.body.n_joint)
+        if gaits.relative_delta and self.paced_by:
             raise ProblemError(
-                f"the class {type(self.gait).__name__} leaves the pace open, but {self.paced_by}; "
+                f"the class {type(gaits).__name__} leaves the pace open, but {self.paced_by}; "
                 f"use Harmonic (period 1)."
             )
         alone = self.body.n_joint == 1
         if self.law.reversible and not self.froude and (alone or _retraces(self)):
             coordinate = self.body.defaults.coordinate
-            which = (
-                f"a body with one {coordinate}" if alone else f"the class ({self.gait.describe()})"
-            )
+            which = f"a body with one {coordinate}" if alone else f"the class ({gaits.describe()})"
             more = f"the body a second {coordinate}" if alone else "the class more freedom"
             raise ProblemError(
                 f"no gait of {which} goes anywhere when mu_f = mu_b: it retraces its path, and "
@@ -365,7 +353,7 @@ class Problem:
             )
         if self.keeps_heading and self.rotation:
             raise ProblemError("two equal links never turn when mu_f = mu_b: rotation must be 0.")
-        if self.keeps_heading and self.gait.symmetry == ANTIPODAL:
+        if self.keeps_heading and symmetry == ANTIPODAL:
             raise ProblemError(
                 "no antipodal gait of two equal links goes anywhere when mu_f = mu_b: the body "
                 "moves along its own axis of symmetry, and as far back while it is bent to the "

@@ -12,9 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.limits import range_of
-from colloc.system.errors import ProblemError
-
 NONE, BILATERAL, ANTIPODAL = SYMMETRIES = ("none", "bilateral", "antipodal")
 _DENSE = 2000
 
@@ -64,34 +61,3 @@ def symmetric_samples(gait: Any, symmetry: str, count: int = _DENSE) -> np.ndarr
     angles = np.roll(angles, -(shift // 2), axis=1)
     angles = 0.5 * (angles - np.roll(angles[::-1, ::-1], 1, axis=1))
     return angles[:, : count + 1]
-
-
-_ALIKE = {BILATERAL: "mirrored joints", ANTIPODAL: "to both sides"}
-
-
-def check_symmetric(problem: Any) -> None:
-    """Raise a `ProblemError` if body or limits of a problem lack the symmetry of its gaits."""
-    symmetry = problem.gait.symmetry
-    if symmetry not in problem.body.symmetries:
-        raise ProblemError(
-            f"gaits of symmetry {symmetry} need a body whose lengths, weights and feet read the "
-            f"same from both ends; "
-            f"gaits of this one may have the symmetry {' or '.join(problem.body.symmetries)}."
-        )
-    if isinstance(problem.joint_limit, tuple):
-        ranges = [range_of(limit) for limit in problem.joint_limit]
-        opposite = [(-high, -low) for low, high in ranges]
-        if (symmetry == BILATERAL and ranges != opposite[::-1]) or (
-            symmetry == ANTIPODAL and ranges != opposite
-        ):
-            raise ProblemError(
-                f"gaits of symmetry {symmetry} bend {_ALIKE[symmetry]} alike: give them the same "
-                f"joint_limit."
-            )
-    for name in ("torque_limit", "power_limit", "speed_limit"):
-        limit = getattr(problem, name)
-        if symmetry == BILATERAL and np.ndim(limit) and limit != limit[::-1]:
-            raise ProblemError(
-                f"gaits of symmetry {symmetry} bend mirrored joints alike: give them the same "
-                f"{name}."
-            )

@@ -10,14 +10,15 @@ long.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.linalg import null_space
 
 from colloc.numerics.peaks import curvature_of_moving
-from colloc.numerics.sqp import NonlinearProgram, stationarity
+from colloc.numerics.sqp import stationarity
+from colloc.reduced.program import ReducedProgram
 
 _STEP, _LONG_STEP = 1e-6, 1e-3
 """Steps of the differences over the norm of v, and of those that confirm a negative curvature."""
@@ -42,61 +43,11 @@ class Curvature:
     direction: np.ndarray
     """Unit vector of smallest curvature, ``(n,)``."""
     kkt_error: float
+    lagrangian: Callable[[np.ndarray], float]
+    """With the rows at the worst instants of a point."""
 
 
-class CheckedProgram(NonlinearProgram, Protocol):
-    """A program whose rows stand at instants that may be moved."""
-
-    @property
-    def row_names(self) -> list[tuple[str, int]]: ...
-
-    def move_checks(self, v: np.ndarray, later: float = 0.0) -> object: ...
-
-    def of_moving_peaks(self, v: np.ndarray, on_rows: np.ndarray) -> np.ndarray: ...
-
-
-class Lagrangian:
-    """Objective plus multipliers times rows near v; `conditions` are those at v."""
-
-    def __init__(self, program: CheckedProgram, v: np.ndarray) -> None:
-        program.move_checks(v)
-        self._program, self._v, self.conditions = program, v, stationarity(program, v)
-        rows, slopes, on_rows = program.rows(v), program.row_slopes(v), self.conditions.on_rows
-        self._held = [
-            (name, on_rows[k], rows[k], slopes[k])
-            for k, name in enumerate(program.row_names)
-            if on_rows[k]
-        ]
-
-    def slope(self, at: np.ndarray) -> np.ndarray:
-        """Gradient ``(n,)`` with the rows at the worst instants of v."""
-        return self._program.gradient(at) + self.conditions.on_rows @ self._program.row_slopes(at)
-
-    def of_moving_instants(self) -> np.ndarray:
-        """Part of the Hessian at v, ``(n, n)``, due to instants that move with the gait."""
-        program, v, on_rows = self._program, self._v, self.conditions.on_rows
-        around = []
-        for later in (-_SHIFT, 0.0, _SHIFT):
-            program.move_checks(v, later)
-            around.append((program.rows(v), program.row_slopes(v)))
-        program.move_checks(v)
-        values, slopes = map(np.array, zip(*around, strict=True))
-        return program.of_moving_peaks(v, on_rows) + curvature_of_moving(on_rows, values, slopes)
-
-    def value(self, at: np.ndarray) -> float:
-        """Value with the rows at the worst instants of this point."""
-        program = self._program
-        program.move_checks(at)
-        value, rows = program.objective(at), program.rows(at)
-        place = {name: k for k, name in enumerate(program.row_names)}
-        for name, multiplier, row, row_slope in self._held:
-            k = place.get(name)
-            value += multiplier * (rows[k] if k is not None else row + row_slope @ (at - self._v))
-        program.move_checks(self._v)
-        return float(value)
-
-
-def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
+def curvature(program: ReducedProgram, v: np.ndarray) -> Curvature:
     """Smallest curvature of the Lagrangian at a stationary point v; ``2 n_free + 2`` gradients.
 
     Examples
@@ -111,33 +62,55 @@ def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
     >>> round(curvature(ReducedProgram(space, 1e-4), v).smallest, 1)
     -0.8
     """
-    lagrangian = Lagrangian(program, v)
-    conditions = lagrangian.conditions
-    equations = program.row_lower == program.row_upper
-    held = equations | (np.abs(conditions.on_rows) > _HELD)
+    program.move_checks(v)
+    conditions = stationarity(program, v)
+    rows, slopes, on_rows = program.rows(v), program.row_slopes(v), conditions.on_rows
+    bound = [(name, k) for k, name in enumerate(program.row_names) if on_rows[k]]
+
+    def value(at: np.ndarray) -> float:
+        program.move_checks(at)
+        found, now = program.objective(at), program.rows(at)
+        place = {name: k for k, name in enumerate(program.row_names)}
+        for name, k in bound:
+            here = place.get(name)
+            row = now[here] if here is not None else rows[k] + slopes[k] @ (at - v)
+            found += on_rows[k] * row
+        program.move_checks(v)
+        return float(found)
+
+    held = (program.row_lower == program.row_upper) | (np.abs(on_rows) > _HELD)
     fixed = np.eye(v.size)[np.abs(conditions.on_bounds) > _HELD]
-    active = np.vstack([program.row_slopes(v)[held], fixed])
+    active = np.vstack([slopes[held], fixed])
     active = active / np.maximum(np.linalg.norm(active, axis=1, keepdims=True), 1e-300)
     free = null_space(active, rcond=_ONE_ROW) if active.size else np.eye(v.size)
     if free.shape[1] == 0:
-        return Curvature(np.inf, 0.0, 0, np.zeros(v.size), conditions.kkt_error)
+        return Curvature(np.inf, 0.0, 0, np.zeros(v.size), conditions.kkt_error, value)
 
-    moving = lagrangian.of_moving_instants()
+    # the part of the Hessian that is due to instants that move with the gait
+    around = []
+    for later in (-_SHIFT, 0.0, _SHIFT):
+        program.move_checks(v, later)
+        around.append((program.rows(v), program.row_slopes(v)))
+    program.move_checks(v)
+    moving = program.of_moving_peaks(v, on_rows)
+    moving += curvature_of_moving(on_rows, *map(np.array, zip(*around, strict=True)))
+
+    def slope(at: np.ndarray) -> np.ndarray:
+        """Gradient of the Lagrangian with the rows at the worst instants of v."""
+        return program.gradient(at) + on_rows @ program.row_slopes(at)
 
     def product(z: np.ndarray, step: float) -> np.ndarray:
-        return (lagrangian.slope(v + step * z) - lagrangian.slope(v - step * z)) / (
-            2 * step
-        ) + moving @ z
+        return (slope(v + step * z) - slope(v - step * z)) / (2 * step) + moving @ z
 
     step = _STEP * (float(np.linalg.norm(v)) or 1.0)
     hessian = free.T @ np.stack([product(z, step) for z in free.T], axis=1)
     values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
-    confirmed, far, here = values.copy(), step * _LONG_STEP / _STEP, lagrangian.value(v)
+    confirmed, far, here = values.copy(), step * _LONG_STEP / _STEP, value(v)
     for k in np.flatnonzero(values < 0):
         along = far * free @ vectors[:, k]
         confirmed[k] = max(
             values[k],
-            (lagrangian.value(v + along) - 2 * here + lagrangian.value(v - along)) / far**2,
+            (value(v + along) - 2 * here + value(v - along)) / far**2,
         )
     first = int(np.argmin(confirmed))
     least = free @ vectors[:, first]
@@ -147,5 +120,5 @@ def curvature(program: CheckedProgram, v: np.ndarray) -> Curvature:
     mixed = np.minimum(np.abs(coupling), coupling**2 / apart)
     error = abs(float(least @ product(least, 0.5 * step)) - values[first]) + mixed.sum()
     return Curvature(
-        float(confirmed[first]), float(error), values.size, least, conditions.kkt_error
+        float(confirmed[first]), float(error), values.size, least, conditions.kkt_error, value
     )

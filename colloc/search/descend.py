@@ -12,7 +12,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.reduced.program import ReducedProgram
-from colloc.reduced.second_order import Lagrangian, curvature
+from colloc.reduced.second_order import curvature
 from colloc.search.checkpoint import active_run
 from colloc.search.converge import optimise
 from colloc.search.iterate import Iterate
@@ -54,12 +54,11 @@ def leave_saddle(iterate: Iterate) -> Iterate | None:
     here = curvature(program, iterate.v)
     if here.smallest + here.error >= 0:
         return None
-    lagrangian, size = Lagrangian(program, iterate.v), np.linalg.norm(iterate.v)
-    value = lagrangian.value(iterate.v)
+    size, value = np.linalg.norm(iterate.v), here.lagrangian(iterate.v)
     for step in (OPTIONS.saddle_step, OPTIONS.saddle_step**2):
         for side in (1.0, -1.0):
             start = iterate.v + side * step * size * here.direction
-            if lagrangian.value(start) >= value:
+            if here.lagrangian(start) >= value:
                 continue
             other = optimise(iterate.space, start, iterate.delta, MEDIUM)
             gain = objective_accuracy(MEDIUM) * abs(iterate.objective)
