@@ -28,8 +28,8 @@ _TURNS = 0.25 * np.pi * np.array([0, 1, -1, 2, -2, 3, -3])
 
 
 class LinearSpace(SearchSpace):
-    """The space of a linear class on a mesh (by default the first one), with pairs of links `far`
-    kept from crossing."""
+    """The space of a class on a mesh (by default the first one), with pairs of links `far` kept
+    from crossing."""
 
     def __init__(
         self,
@@ -52,22 +52,31 @@ class LinearSpace(SearchSpace):
             self._side_rates = rates / (2 * np.pi)
         else:
             self._square = self._gaits.mean_square_rate(n_joint) / (2 * np.pi) ** 2
-        self.lower, self.upper = control.admissible.bounds()
-        self.own = np.arange(self.lower.size)
+        self._n_static = len(control.admissible.static)
+        lower, upper = control.admissible.bounds()
+        self.own = np.arange(lower.size)
+        if not self._gaits.linear:
+            self.own = np.delete(self.own, slice(self._gaits.n_own, lower.size - self._n_static))
+        self.lower, self.upper = lower[self.own], upper[self.own]
         self._peaks = keep_last(
             lambda v: near_peaks(self.trajectory(v), self.mesh, self.checks, self._limit)
         )
 
     def shape(self, v: np.ndarray) -> np.ndarray:
-        """Parameters of the class."""
-        return v[: self._matrix.shape[2]]
+        """Parameters of the class, of serpenoid gaits with their Fourier coefficients."""
+        own = v[: self.n - self._n_static]
+        return own if self._gaits.linear else self._gaits.full(own, self._matrix.shape[1] // 2)
 
     def shape_vjp(self, v: np.ndarray, on_shape: np.ndarray) -> np.ndarray:
         """Derivatives ``(k, n)`` along v from those along `shape`."""
-        return np.pad(on_shape, ((0, 0), (0, v.size - on_shape.shape[1])))
+        own = v[: self.n - self._n_static]
+        if not self._gaits.linear:
+            slopes = self._gaits.coefficient_slopes(own, self._matrix.shape[1] // 2)
+            on_shape = on_shape @ np.vstack([np.eye(own.size), slopes])
+        return np.pad(on_shape, ((0, 0), (0, self._n_static)))
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
-        return np.append(self.shape(v), v[v.size - len(self.control.admissible.static) :])
+        return np.append(self.shape(v), v[self.n - self._n_static :])
 
     def trajectory(self, v: np.ndarray) -> AnyGait:
         return self._gaits.trajectory(self.shape(v), self.control.admissible.n_joint)
@@ -181,30 +190,3 @@ class LinearSpace(SearchSpace):
                 each = each._replace(matrix=matrix)
             found.append(each)
         return found
-
-
-class SerpenoidSpace(LinearSpace):
-    """The space of the class `colloc.gaits.serpenoid.Serpenoid`, by the chain rule through the
-    Fourier coefficients."""
-
-    def __init__(
-        self,
-        control: ControlProblem,
-        edges: np.ndarray | None = None,
-        scheme: str = "",
-        far: Pairs = (),
-    ) -> None:
-        super().__init__(control, edges, scheme, far)
-        self._n_own, static = self._gaits.n_own, len(control.admissible.static)
-        self.own = np.append(self.own[: self._n_own], self.own[self.own.size - static :])
-        self.lower, self.upper = self.lower[self.own], self.upper[self.own]
-
-    def shape(self, v: np.ndarray) -> np.ndarray:
-        return self._gaits.full(v[: self._n_own], self.control.admissible.n_joint)
-
-    def shape_vjp(self, v: np.ndarray, on_shape: np.ndarray) -> np.ndarray:
-        coefficients = self._gaits.coefficient_slopes(
-            v[: self._n_own], self.control.admissible.n_joint
-        )
-        on_own = on_shape @ np.vstack([np.eye(self._n_own), coefficients])
-        return super().shape_vjp(v, on_own)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -24,10 +24,10 @@ from colloc.dynamics.dynamics import (
     Inertial,
     PeriodTotals,
     QuasiStatic,
+    Shapes,
     TotalGradient,
     Trajectory,
 )
-from colloc.dynamics.dynamics import Shapes as Moving
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, JointMap, PathLimits, Quantity
@@ -36,21 +36,13 @@ from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
 
 
-class Shapes(Protocol):
-    """Gaits by parameters, on the points of a mesh (`colloc.reduced.program.SearchSpace`)."""
-
-    def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
-
-    def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray: ...
-
-
 @dataclass(eq=False)
 class _State:
     """The collocated motion of one v at one delta."""
 
     v: np.ndarray
     delta: float
-    shapes: Moving
+    shapes: Shapes
     along: Trajectory
     out: np.ndarray
     """Rotation rate, velocity of the centre and power over the pace, ``(4, n_point)``."""
@@ -67,10 +59,11 @@ class ReducedMotion:
     """Totals of a period as functions of parameters; the mesh covers the solved part of it."""
 
     def __init__(
-        self, kind: QuasiStatic, mesh: Mesh, shapes: Shapes, integrals: Sequence[Quantity] = ()
+        self, kind: QuasiStatic, mesh: Mesh, space: Any, integrals: Sequence[Quantity] = ()
     ) -> None:
-        self.kind, self.mesh = kind, mesh
-        self._shapes: Any = shapes  # a `SearchSpace` where actuators are limited
+        """`space` is a `colloc.reduced.program.SearchSpace`, of which `at` and `vjp` are enough
+        where no actuators are limited."""
+        self.kind, self.mesh, self._space = kind, mesh, space
         self._n_static = len(kind.static_parameters)
         self._integrals = integrals
         self._weight = stage_weights(mesh)
@@ -84,8 +77,8 @@ class ReducedMotion:
         last, mesh, kind = self._last, self.mesh, self.kind
         if last is not None and last.delta == delta and np.array_equal(last.v, v):
             return last
-        angles, rates, pace = self._shapes.at(v)
-        shapes, static = Moving(angles, rates, delta, pace=pace), v[v.size - self._n_static :]
+        angles, rates, pace = self._space.at(v)
+        shapes, static = Shapes(angles, rates, delta, pace=pace), v[v.size - self._n_static :]
         along = kind.simulate(mesh, shapes, static, *self._start(shapes, static))
         self.solves += 1
         now = along.now
@@ -106,7 +99,7 @@ class ReducedMotion:
         return self.kind.turn / float(self._point_weight @ pace) if self.kind.turn else 0.0
 
     def _start(
-        self, shapes: Moving, static: np.ndarray
+        self, shapes: Shapes, static: np.ndarray
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
         """States and tail velocities to start from: those of the last gait, or of the last one
         differentiated moved along its slopes."""
@@ -149,8 +142,8 @@ class ReducedMotion:
         if "theta" in kind.states:
             k, tau = self._places(t)
             theta = self.at(v, delta).pose.at(k, tau)[0]
-        angles, rates = self._shapes.at_times(v, t)
-        shapes = Moving(angles, rates, delta)
+        angles, rates = self._space.at_times(v, t)
+        shapes = Shapes(angles, rates, delta)
         return np.asarray(limits.at(kind.instants(shapes, theta)))
 
     def share_slopes(
@@ -174,7 +167,7 @@ class ReducedMotion:
         totals = [TotalGradient()] * n_row
         if not inertial:
             if not at_points[:, -1].any():
-                return self._shapes.vjp(v, at_points[:, :-1].transpose(0, 2, 1), no_pace)
+                return self._space.vjp(v, at_points[:, :-1].transpose(0, 2, 1), no_pace)
             return self._through(s, totals, at_points, no_pace)
         on_shape, on_accelerations, on_states, on_froude = np.split(
             at_points, [2 * n, 3 * n, 3 * n + len(STATES)], axis=1
@@ -186,7 +179,7 @@ class ReducedMotion:
             totals = [TotalGradient(static=value) for value in on_log_period]
         on_points = np.concatenate([on_shape, no_pace[:, None]], axis=1)
         through = self._through(s, totals, on_points, no_pace, by_states)
-        return through + self._shapes.accelerations_vjp(v, on_accelerations)
+        return through + self._space.accelerations_vjp(v, on_accelerations)
 
     def _places(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Intervals of times of the mesh, and fractions of them."""
@@ -201,12 +194,12 @@ class ReducedMotion:
         mesh, (angles, rates, *_) = self.mesh, s.shapes
         momenta = s.along.states[: len(STATES)]
         if t is not None:
-            angles, rates = self._shapes.at_times(s.v, t)
+            angles, rates = self._space.at_times(s.v, t)
             k, tau = self._places(t)
             nodes = [s.along.edges[:, :-1, None], momenta[:, mesh.points]]
             weights = mesh.scheme.with_begin(tau)
             momenta = np.einsum("nj,anj->an", weights, np.concatenate(nodes, axis=2)[:, k])
-        accelerations = self._shapes.accelerations(s.v, mesh.times if t is None else t)
+        accelerations = self._space.accelerations(s.v, mesh.times if t is None else t)
         froude = np.full((1, angles.shape[1]), kind.froude_at(s.shapes, s.passed.static))
         return np.concatenate([angles, rates, accelerations, momenta, froude])
 
@@ -253,7 +246,7 @@ class ReducedMotion:
             on_pace += np.outer(on_out[:, 0] @ pace, even / (weight @ pace) * weight)
         on_shape = np.einsum("krt,rjt->ktj", on_out * pace, slopes[OUTPUTS])
         on_shape += on_points[:, :-1].transpose(0, 2, 1)
-        found: np.ndarray = self._shapes.vjp(s.v, on_shape, on_pace)
+        found: np.ndarray = self._space.vjp(s.v, on_shape, on_pace)
         if self._n_static:
             found[:, -self._n_static :] += on_begin
             found[:, -self._n_static] += [each.static for each in gradients]

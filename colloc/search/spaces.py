@@ -9,14 +9,13 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
-from colloc.gaits.serpenoid import Serpenoid
 from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.contact import Pairs
-from colloc.reduced.linear_space import LinearSpace, SerpenoidSpace
+from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.program import SearchSpace
 from colloc.transcription.full_program import FullProgram, full_program
 
-SPACES = LinearSpace, SerpenoidSpace, SearchSpace
+SPACES = LinearSpace, SearchSpace
 
 
 def space_of(
@@ -30,12 +29,7 @@ def space_of(
     own time without one), with pairs of links `far` kept from crossing."""
     if gait is not None and edges is not None:
         edges = problem.gait.times(gait, edges)
-    if isinstance(problem.gait, Serpenoid):
-        space: type = SerpenoidSpace
-    elif isinstance(problem.gait, Prescribed):
-        space = SearchSpace
-    else:
-        space = LinearSpace
+    space: type = SearchSpace if isinstance(problem.gait, Prescribed) else LinearSpace
     return space(control_problem(problem), edges, scheme, far)
 
 
