@@ -46,25 +46,12 @@ def followed_motion(
     quantities: Sequence[Quantity] = (),
     joint_map: JointMap | None = None,
 ) -> FollowedMotion | None:
-    """The motion of a gait where its law may allow several; None for a body whose other motions are
-    not looked for.
+    """The motion of a gait where its law may allow several, and how far `quantities` of the others
+    lie apart; None for a body whose other motions are not looked for.
 
-    Parameters
-    ----------
-    body, friction
-    angles, rates : (n_joint, n_time)
-        Of one period in order of time, or of any instants whose predecessors are known.
-    delta : float
-        Regularisation speed.
-    before : (3, n_time), optional
-        Tail velocities shortly before each instant; by default those of its neighbour in the order
-        of time.
-    sense : {FORWARDS, BACKWARDS}
-        Which neighbour: the branches are followed with or against time.
-    quantities : sequence of Quantity
-        Of which it is asked how far they lie apart.
-    joint_map : JointMap, optional
-        From the motors, of which quantities speak, to the joints.
+    Angles and rates ``(n_joint, n_time)`` are those of one period in order of time, followed with
+    or against it (`sense`), or of instants whose tail velocities shortly before are known
+    (`before`, ``(3, n_time)``).
     """
     if not isinstance(body, Chain):
         return None

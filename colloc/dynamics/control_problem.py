@@ -96,17 +96,7 @@ class Aims(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ControlProblem:
-    """An optimal control problem in units of friction; `unit` is the friction that is 1 here.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> light = control_problem(colloc.Problem("light", friction=colloc.Friction(1e-3, 1e-3, 1e-3)))
-    >>> light.unit, light.dynamics.law.mu_t
-    (0.001, 1.0)
-    >>> round(light.stated(0.25))  # an efficiency
-    250
-    """
+    """An optimal control problem in units of friction; `unit` is the friction that is 1 here."""
 
     problem: Problem
     dynamics: QuasiStatic

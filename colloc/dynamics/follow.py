@@ -55,32 +55,12 @@ def integrate_period(
     breaks: tuple[float, ...] = (),
     longest: float = np.inf,
 ) -> Course:
-    """Follow states from phase 0 to 1.
+    """Follow states from `begin` ``(n_state,)`` at phase 0 to 1, each to about a tolerance, by
+    steps no longer than `longest`; `NotConvergedError` if the solver cannot go on.
 
-    Parameters
-    ----------
-    rates : callable
-        Of a phase, the states ``(n_state,)`` and what it last said to remember (None at first):
-        their rates, and what to remember, such as velocities from which the next balance may start.
-    begin : (n_state,)
-    tolerance : (n_state,) or float
-        About the error of each at the end.
-    breaks : tuple of float
-        Phases in (0, 1), ascending, at which the rates jump.
-    longest : float
-        No step is longer.
-
-    Raises
-    ------
-    NotConvergedError
-        If the solver cannot go on.
-
-    Examples
-    --------
-    >>> ran = integrate_period(
-    ...     lambda t, s, _: (np.array([s[1], -s[0]]), None), np.array([1.0, 0.0]), 1e-8)
-    >>> bool(abs(ran.states[0, -1] - np.cos(1)) < 1e-8)
-    True
+    rates: of a phase, the states and what it last said to remember (None at first), such as
+    velocities from which the next balance may start: their rates, and what to remember. breaks:
+    phases in (0, 1), ascending, at which the rates jump.
     """
     from scipy.integrate import solve_ivp
 

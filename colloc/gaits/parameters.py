@@ -50,19 +50,7 @@ class Parameter:
 
 
 def parameters(problem: Problem) -> list[Parameter]:
-    """The numbers of a problem that a sensitivity is asked for.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> from colloc.gaits.parameters import parameters
-    >>> for each in parameters(colloc.Problem("mine", gait=colloc.Harmonic(1, "bilateral")))[:4]:
-    ...     print(each.name, round(each.value, 3))
-    friction sideways 1.0
-    friction forwards 1.0
-    friction backwards 1.0
-    length of links 1 and 3 0.333
-    """
+    """The numbers of a problem that a sensitivity is asked for."""
     chain = problem.body if isinstance(problem.body, Chain) else None
     numbers = []
 

@@ -29,22 +29,8 @@ class Period:
     """Quantities of a period, by the names of `colloc.gaits.objective.QUANTITIES`; what nobody
     measured is left out.
 
-    Attributes
-    ----------
-    values : mapping of str to float
-    errors : mapping of str to float
-        How much each may be wrong by, of unknown sign.
-    others : mapping of str to float
-        How much each could change at most if the body took any other of its balanced motions; empty
-        where there is one motion.
-
-    Examples
-    --------
-    >>> known = Period({"distance": 0.5, "work": 2.0}, {"distance": 1e-3, "work": 2e-3}, {})
-    >>> known.efficiency
-    0.25
-    >>> round(known.error_of(Objective("distance / work")), 6)
-    0.003
+    errors: how much each may be wrong by, of unknown sign. others: how much each could change at
+    most if the body took any other of its balanced motions; empty where there is one.
     """
 
     values: Mapping[str, float] = field(hash=False)

@@ -55,13 +55,7 @@ symmetry none, delta 1e-04>
 @dataclass(frozen=True, kw_only=True)
 class Regime:
     """Gravity and inertia. A regime of one's own derives from it and says its `dynamics`, a class
-    like those of `colloc.dynamics.dynamics`, its ``replay`` and its ``reference``.
-
-    Examples
-    --------
-    >>> Regime(grade=0.1).describe()
-    'slope of grade 0.1: d is the climb, W the work of the joints'
-    """
+    like those of `colloc.dynamics.dynamics`, its ``replay`` and its ``reference``."""
 
     grade: float = 0.0  # tangent of the inclination; +x is straight uphill
     towards: float | None = None  # from straight uphill to the left [rad]; None: the climb counts

@@ -48,20 +48,7 @@ class Curvature:
 
 
 def curvature(program: ReducedProgram, v: np.ndarray) -> Curvature:
-    """Smallest curvature of the Lagrangian at a stationary point v; ``2 n_free + 2`` gradients.
-
-    Examples
-    --------
-    The gait between the two ways of bending of three equal links is a saddle:
-
-    >>> from colloc import Harmonic, Problem, ellipse
-    >>> from colloc.reduced.program import ReducedProgram
-    >>> from colloc.search.spaces import space_near
-    >>> space, v = space_near(Problem("saddle", gait=Harmonic(1, "bilateral")), ellipse(0.0,
-    ...     0.307347, 0.767811))
-    >>> round(curvature(ReducedProgram(space, 1e-4), v).smallest, 1)
-    -0.8
-    """
+    """Smallest curvature of the Lagrangian at a stationary point v; ``2 n_free + 2`` gradients."""
     program.move_checks(v)
     conditions = stationarity(program, v)
     rows, slopes, on_rows = program.rows(v), program.row_slopes(v), conditions.on_rows
