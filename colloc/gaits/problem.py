@@ -265,10 +265,15 @@ class Problem:
                 f"{self.scheme}."
             )
         fewest, what = self.gait.fewest_intervals(collocation.s - collocation.left)
-        if not is_whole(self.intervals, fewest, MOST_INTERVALS):
+        if not is_whole(self.intervals, most=MOST_INTERVALS):
             raise ProblemError(
-                f"intervals must be a whole number from {fewest}, which resolve {what} by "
-                f"{self.scheme}, to {MOST_INTERVALS}, not {self.intervals!r}."
+                f"intervals must be a whole number of at most {MOST_INTERVALS}, not "
+                f"{self.intervals!r}."
+            )
+        if self.intervals < fewest:
+            raise ProblemError(
+                f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot "
+                f"resolve {what}; use at least {fewest}."
             )
 
     def _check_aims(self) -> None:
