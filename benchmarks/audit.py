@@ -35,7 +35,7 @@ from colloc.gaits.harmonic import harmonics_within
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
 from colloc.results.measured import measured
 from colloc.results.solution import SOLVED
-from colloc.verification.replay_record import Path as GaitPath
+from colloc.verification.adaptive_motion import Path as GaitPath
 from scripts.program import add_to_record, command_line, read_record
 
 SEED, GAIT_SEED = 1000, 24

@@ -22,9 +22,8 @@ from colloc import Chain, Fourier, Friction, NotConvergedError, inertial_motion
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
 from colloc.results.measured import measured
-from colloc.verification.inertial_motion import GaitWithInertia
+from colloc.verification.differential_motion import GaitOnSlope, GaitWithInertia
 from colloc.verification.replay import replayer
-from colloc.verification.slope import GaitOnSlope
 from scripts.program import command_line
 
 FINER, LEAST = 1e-2, 1e-11

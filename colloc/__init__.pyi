@@ -38,9 +38,9 @@ from colloc.results.store import load as load, save as save
 from colloc.search.evaluate import evaluate as evaluate
 from colloc.search.certify import certify as certify
 from colloc.verification.replay import replay as replay
-from colloc.verification.slope import slope_motion as slope_motion
-from colloc.verification.inertial_motion import inertial_motion as inertial_motion
-from colloc.verification.inertial_motion import motion_from_rest as motion_from_rest
+from colloc.verification.differential_motion import slope_motion as slope_motion
+from colloc.verification.differential_motion import inertial_motion as inertial_motion
+from colloc.verification.differential_motion import motion_from_rest as motion_from_rest
 from colloc.dynamics.slow_enough import slow_enough as slow_enough
 from colloc.mechanics.fixed_point import solve_balance as solve_balance
 from colloc.system.errors import (

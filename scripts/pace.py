@@ -18,7 +18,7 @@ from colloc.pictures.figure import draw_gait
 from colloc.pictures.style import BLUE, GREY, Picture, save, styled
 from colloc.results.solution import Solution
 from colloc.search.solve import solve
-from colloc.verification.inertial_motion import inertial_motion
+from colloc.verification.differential_motion import inertial_motion
 from scripts.program import command_line
 
 FROUDE = tuple(float(f"{froude:.3g}") for froude in np.geomspace(1e-3, 1.0, 13))

@@ -21,7 +21,7 @@ from colloc.pictures.style import SERIES, save, styled, subplots
 from colloc.results.solution import Solution
 from colloc.search.solve import solve
 from colloc.system.errors import NotConvergedError
-from colloc.verification.slope import SlopeMotion, slope_motion
+from colloc.verification.differential_motion import SlopeMotion, slope_motion
 from scripts.program import command_line
 
 SCENES = (

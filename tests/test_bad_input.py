@@ -14,7 +14,7 @@ from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.smooth.balance import Motion, solve_smooth
 from colloc.smooth.prescribed_body import Wave
 from colloc.system.errors import OrderWarning
-from colloc.verification.slope import checked_chain
+from colloc.verification.differential_motion import checked_chain
 from colloc.verification.trajectory import plan_trajectory
 
 GAIT = colloc.ellipse(0.0, 1.2, 0.8)

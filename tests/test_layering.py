@@ -26,9 +26,7 @@ ONLY = {
 COLLOCATED = re.compile(
     r"colloc\.(dynamics\.(collocated|states|dynamics|control_problem)|numerics\.mesh|transcription|reduced|search)\b"
 )
-ADAPTIVE = (
-    "replay_record replay panels adaptive_motion slope inertial_motion dry_balance dry_friction"
-)
+ADAPTIVE = "adaptive_motion differential_motion replay dry_friction"
 
 
 def imported(path):

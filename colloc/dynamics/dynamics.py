@@ -127,7 +127,7 @@ class QuasiStatic:
     states: ClassVar[tuple[str, ...]] = ()
     followed = False
     """Whether mesh errors come from a differential equation
-    (`colloc.verification.reference_motion`)."""
+    (`colloc.verification.mesh_error`)."""
     lack = "no velocity balances the body; give another guess"
     """What may be wrong where a gait has no motion, and what to try."""
 

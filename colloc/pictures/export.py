@@ -43,7 +43,7 @@ from colloc.results.solution import Solution
 from colloc.system.arguments import check_count, checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import write_text
-from colloc.verification.inertial_motion import GaitWithInertia, inertial_motion
+from colloc.verification.differential_motion import GaitWithInertia, inertial_motion
 from colloc.verification.trajectory import (
     MOST_SAMPLES,
     Approach,

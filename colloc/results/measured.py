@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
+from colloc.verification.adaptive_motion import Path, Replay
 from colloc.verification.replay import replay
-from colloc.verification.replay_record import Path, Replay
 
 PARTS_OF_DELTA = (1.0, 0.1, 0.01)
 _DECADE = PARTS_OF_DELTA[1]

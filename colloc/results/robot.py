@@ -91,7 +91,7 @@ class _MotionWithInertia:
     """
 
     def __init__(self, solution: Solution, froude: float) -> None:
-        from colloc.verification.inertial_motion import GaitWithInertia  # slow to import
+        from colloc.verification.differential_motion import GaitWithInertia  # slow to import
 
         problem, self._gait = solution.problem, solution.gait
         moving = GaitWithInertia(

@@ -314,7 +314,7 @@ class Solution:
             If the problem states no pace: without inertia the first period is like all others.
         """
         # loads what integrates, which few need
-        from colloc.verification.inertial_motion import (
+        from colloc.verification.differential_motion import (
             motion_from_rest,
         )
 

@@ -13,9 +13,9 @@ from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import Certificate, Check
 from colloc.results.measured import astray, measured
 from colloc.search.options import TOLERANCES
+from colloc.verification.adaptive_motion import Path, Replay
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replayer
-from colloc.verification.replay_record import Path, Replay
 
 _FINE_PHASES = 20000
 

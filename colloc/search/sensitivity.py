@@ -34,8 +34,8 @@ from colloc.search.options import FINE, MEDIUM
 from colloc.search.solve import finish
 from colloc.search.spaces import on_mesh_of, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
+from colloc.verification.adaptive_motion import Replay
 from colloc.verification.replay import replayer
-from colloc.verification.replay_record import Replay
 
 CHANGE = 0.1
 _STEP = 1e-5

@@ -1,24 +1,25 @@
-"""A gait's motion by adaptive Gauss quadrature, at any phase.
+"""A gait's motion by adaptive Gauss quadrature, at any phase, and the record of a period.
 
 Panels are halved until both halves agree with them, so they shrink towards the kinks of stick and
-slip. Knowing nothing of a collocation mesh, they are what meshes are measured against.
+slip. They know nothing of a collocation mesh: it is held against them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from colloc.dynamics.branches import on_one_branch
-from colloc.gaits.objective import EFFICIENCY
+from colloc.gaits.objective import EFFICIENCY, Objective
+from colloc.gaits.period import Period, chord_per_way
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
 from colloc.numerics.schemes import Scheme, scheme
-from colloc.verification.replay_record import Path
+from colloc.system.errors import NotConvergedError
 
 PANEL_RULE = scheme("gauss-5")
 _TO_MIDDLE = PANEL_RULE.integrals(np.array([0.5]))[0]
@@ -27,9 +28,13 @@ _NARROWEST = 1e-9
 _MOST_PANELS = 20_000
 _PIECES = 400, 200
 """Pieces of a path in which a quantity is summed up, and once more for the error."""
+_TENTH = 0.1  # error of each run over that of the last
+LEAST = 1e-12  # the smallest error that is tried
 
-Increments = tuple[np.ndarray, ...]
-"""Rotation, displacement in the initial body frame (complex), work and quantities of intervals."""
+Path = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""Joint angles and rates, each ``(n_joint, n_time)``, at phases ``(n_time,)``."""
+Numbers = dict[str, float]
+Ran = TypeVar("Ran")
 
 
 class Rates(NamedTuple):
@@ -98,7 +103,7 @@ def whole_totals(
 
 def increments(
     rule: Scheme, h: np.ndarray, rates: Rates, weights: np.ndarray | None = None
-) -> Increments:
+) -> tuple[np.ndarray, ...]:
     """Increments of intervals of length h ``(n,)`` from rates at the nodes of the rule ``(n, s)``;
     other weights are those of an integral over a part of the interval."""
     omega, b = rates.z[2], rule.b if weights is None else weights
@@ -135,7 +140,7 @@ class FineMotion:
         weights = PANEL_RULE.lagrange(fraction.ravel()).reshape(*t.shape, -1)
         return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
 
-    def at(self, t: np.ndarray) -> Increments:
+    def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Orientation, displacement, work and quantities at phases t ``(n_time,)``."""
         k, fraction, h = self._locate(t)
         weights = PANEL_RULE.integrals(fraction) * h[k][:, None]
@@ -156,17 +161,21 @@ def fine_motion(
     delta: float,
     edges: np.ndarray,
     tolerance: float,
-    shares: Callable[[Mapping[str, float]], Mapping[str, float]] = EFFICIENCY.shares,
+    objective: Objective | None = EFFICIENCY,
+    *,
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
+    periods: float = 1.0,
 ) -> FineMotion:
-    """Integrate a path over panels that begin as those of `edges`, to a relative error of an
-    objective.
+    """Integrate a path, in panels that begin as those of `edges`, to a relative error of an
+    objective of so many of it; without one to an absolute error of the way.
 
-    `shares` gives its relative change per unit of way, work, rotation and quantities; the way is
-    seen from axes that turn evenly, by `turn` a period. `NotConvergedError` without a balance.
+    The way is seen from axes that turn evenly, by `turn` a period. `NotConvergedError` without a
+    balance.
     """
     names = "work", *(quantity.name for quantity in quantities)
+    counts = dict.fromkeys(names, periods) | {"rotation": 1.0}
+    counts["distance"] = periods * chord_per_way(turn)
     asked: Any = {"quantities": quantities, "turn": turn}
     left, width = edges[:-1], np.diff(edges)
     nodes = left[:, None] + width[:, None] * PANEL_RULE.c
@@ -205,35 +214,113 @@ def fine_motion(
         joined = zip(rates.of(rest), new, strict=True)
         rates = Rates(*(np.concatenate(pair, axis=-2) for pair in joined)).of(place)
         parts = increments(PANEL_RULE, width, rates)
-        on_spin, on_move, *on_sums = _error_weights(parts, names, shares)
-        change = sum(
-            np.abs(move) * on_move
-            + np.abs(spin) * on_spin
-            + sum(np.abs(part) * share for share, part in zip(on_sums, sums, strict=True))
-            for spin, move, *sums in (at_end, half_way)
-        )
+        theta, way, totals = _cumulative(parts)
+        share = {"distance": 1.0}
+        if objective is not None:
+            passed = dict(zip(names, totals[:, -1], strict=True))
+            passed |= {"distance": max(abs(way[-1]), 1e-300), "rotation": theta[-1] + turn}
+            passed["work"] = max(passed["work"], 1e-300)
+            share = objective.shares({x: counts[x] * value for x, value in passed.items()})
+            share = {x: abs(counts[x] * share[x]) for x in counts}
+        on_spin = share["distance"] * np.abs(way - way[-1]).max() + share.get("rotation", 0.0)
+        weights = [on_spin, share["distance"], *(share.get(name, 0.0) for name in names)]
+        off = zip(weights, at_end, half_way, strict=True)
+        change = sum(weight * (np.abs(a) + np.abs(b)) for weight, a, b in off)
         gap = np.concatenate([gap[rest], np.repeat(0.5 * change, 2)])[place]
     return FineMotion(np.append(left, edges[-1]), rates, *_cumulative(parts), gap)
 
 
-def _error_weights(
-    parts: Increments,
-    names: tuple[str, ...],
-    shares: Callable[[Mapping[str, float]], Mapping[str, float]],
-) -> list[float]:
-    """Relative change of the objective per unit of rotation, displacement, work and quantities."""
-    theta, path, totals = _cumulative(parts)
-    period = dict(zip(names, totals[:, -1], strict=True))
-    period |= {"distance": max(abs(path[-1]), 1e-300), "rotation": theta[-1]}
-    period["work"] = max(period["work"], 1e-300)
-    share = {name: abs(value) for name, value in shares(period).items()}
-    reach = np.abs(path - path[-1]).max()
-    on_spin = share["distance"] * reach + share["rotation"]
-    return [on_spin, share["distance"], *(share.get(name, 0.0) for name in names)]
-
-
-def _cumulative(parts: Increments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _cumulative(parts: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Orientation, lab displacement, and work and quantities at the edges."""
     theta, *totals = (np.append(0.0, np.cumsum(part)) for part in (parts[0], *parts[2:]))
     moved = np.exp(1j * theta[:-1]) * parts[1]
     return theta, np.append(0.0, np.cumsum(moved)), np.stack(totals)
+
+
+@dataclass(frozen=True)
+class Replay(Period):
+    """A simulated period of a gait, and how far its quantities can be trusted."""
+
+    lever: float  # largest distance of a point of the body from its centre of mass [body lengths]
+    actuator_work: float  # of the joints, by their moments; equals `work` in balance
+    residual: float
+    """Largest force or torque left over, in units of the largest friction coefficient; with inertia
+    the change of the momenta in a period."""
+    error: float  # relative, of the objective
+    several: float  # part of the period at which several motions are balanced
+    instants: int
+    tail: tuple[np.ndarray, np.ndarray] = field(compare=False)
+    """Phases ``(n,)`` and tail velocities there ``(3, n)``."""
+    shares: np.ndarray = field(default_factory=lambda: np.empty(0), compare=False)
+    """Largest shares of the actuators' limits."""
+    objective: Objective = EFFICIENCY
+    across: float = 0.0  # on a slope the way across the direction that counts
+    multipliers: tuple[complex, ...] = ()
+    """By what small changes of the momenta are multiplied in a period with inertia."""
+
+    def __repr__(self) -> str:
+        value = f"{self.objective.short} = {self.value:.6g} +- {self.error * abs(self.value):.0e}"
+        return (
+            f"<Replay at {self.instants} instants: {value}, d = {self.distance:.6g}, W = "
+            f"{self.work:.6g}>"
+        )
+
+    def tail_velocity(self, t: np.ndarray) -> np.ndarray:
+        """Tail velocities ``(3, n_time)`` interpolated at phases t."""
+        known, z = self.tail
+        return np.stack([np.interp(t, known, row, period=1.0) for row in z])
+
+    @property
+    def value(self) -> float:
+        """The objective."""
+        return self.objective(self.values)
+
+    @property
+    def ambiguity(self) -> float:
+        """Largest relative change of the objective by other balanced motions."""
+        return self.ambiguity_of(self.objective)
+
+    @property
+    def turning(self) -> float:
+        """Rotation times lever over distance: relative change of the distance by another followed
+        point of the body."""
+        return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
+
+
+def to_tolerance(
+    run: Callable[[float], tuple[Ran, Numbers]],
+    first: float,
+    objective: Objective,
+    tolerance: float,
+    known: tuple[Numbers, Numbers],
+    errors_of: Callable[[Ran, Ran], Numbers] | None = None,
+) -> tuple[Ran, Numbers, Numbers]:
+    """Solve a differential equation with ever smaller errors a step until these change an objective
+    by less than a relative error: the last run, its numbers and their errors.
+
+    `run` takes an error, `first` to begin with; `known` are other numbers and their errors;
+    `errors_of` compares a run with one of ten times the error: by default their difference, but
+    half of the error at least, as differences vanish now and then. `NotConvergedError` if rounding
+    hides the accuracy.
+    """
+    aim, before = max(first, LEAST / _TENTH), None
+    while aim > 0.5 * LEAST:
+        ran, now = run(aim)
+        if before is not None:
+            if errors_of is None:
+                errors = {x: max(abs(now[x] - before[1][x]), 0.5 * aim) for x in now}
+            else:
+                errors = dict.fromkeys(now, 0.0) | errors_of(ran, before[0])
+            values, errors = now | known[0], errors | known[1]
+            if not objective.relative_error(values, errors) > tolerance:
+                return ran, values, errors
+        aim, before = _TENTH * aim, (ran, now)
+    raise NotConvergedError(
+        f"the motion cannot be replayed to a relative error of {tolerance:.0e}."
+    )
+
+
+def lever(body: Body, angles: np.ndarray) -> float:
+    """Largest distance of a point of the body from its centre of mass."""
+    (x, y), (gx, gy) = body.outline(angles), body.centre(angles)
+    return float(np.hypot(x - gx, y - gy).max())

@@ -1,4 +1,4 @@
-"""Errors of a collocated gait, interval by interval.
+"""Errors of a collocated gait, interval by interval, and the motion that meshes are held against.
 
 On an interval the scheme takes the rate of a state to be the polynomial through its values at the
 nodes; the integral of the *defect*, that polynomial less the true rate, is the error it adds.
@@ -6,7 +6,7 @@ nodes; the integral of the *defect*, that polynomial less the true rate, is the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,20 +14,15 @@ import numpy as np
 
 from colloc.dynamics.collocated import CollocatedPose, stage_weights
 from colloc.dynamics.control_problem import Admissible, ControlProblem
-from colloc.dynamics.dynamics import OMEGA, PeriodTotals
+from colloc.dynamics.dynamics import OMEGA, PeriodTotals, QuasiStatic, Shapes, Trajectory
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
-from colloc.gaits.period import chord_per_way
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import crossing_depth, far_pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
-from colloc.verification.adaptive_motion import (
-    fine_motion,
-    rates_at,
-    totals_along,
-)
-from colloc.verification.reference_motion import collocate, period_of, reference_motion
+from colloc.verification.adaptive_motion import LEAST, fine_motion, rates_at, totals_along
+from colloc.verification.differential_motion import GaitOnSlope, GaitWithInertia, amplification
 
 FINER = 0.05
 """What the panels may miss, over the error they measure or the tolerance."""
@@ -54,6 +49,20 @@ class MeshError:
         return float(np.abs(self.value).sum() + self.unresolved)
 
 
+class ReferenceMotion(NamedTuple):
+    """The motion of a gait with states by its differential equation."""
+
+    at: Callable[[np.ndarray], np.ndarray]
+    """Momenta if they are states, theta, place, work against friction, ``(4 or 7, n)``, at
+    ascending phases, seen from axes that turn evenly."""
+    error: float  # about that of these states
+    sums: Callable[[np.ndarray], np.ndarray] | None = None
+    """Quantities that forces are needed for up to ascending phases, ``(k, n)``."""
+    alone: Callable[..., Any] | None = None
+    """Intervals by themselves (`colloc.dynamics.dynamics.Inertial.alone`); None: their errors are
+    seen in the whole motion."""
+
+
 class Known(NamedTuple):
     """A gait, delta per period, and its motion (`gait_motion`)."""
 
@@ -66,21 +75,39 @@ class Known(NamedTuple):
 def gait_motion(
     control: ControlProblem, gait: AnyGait, delta: float, mesh: Mesh, tolerance: float
 ) -> Any:
-    """The gait's motion: a `FineMotion`; where it has states, a `ReferenceMotion`."""
+    """The gait's motion, delta per period, to a relative error of the objective: a `FineMotion`;
+    where it has states, a `ReferenceMotion`, by an error of the states. A regime of one's own has
+    it as ``reference``."""
     kind = control.dynamics
-    if kind.followed:
-        return reference_motion(control, gait, delta, mesh, tolerance)
-
-    def shares(part: Mapping[str, float]) -> dict[str, float]:
-        """Relative change of the objective per unit of each quantity of the solved part."""
-        chords = kind.periods * chord_per_way(kind.turn)
-        counts = dict.fromkeys(part, kind.periods) | {"distance": chords, "rotation": 1.0}
-        period = {name: counts[name] * value for name, value in part.items()}
-        by_period = control.aims.objective.shares(period)
-        return {name: counts[name] * by_period[name] for name in part}
-
-    asked: Any = {"quantities": control.aims.integrals, "turn": kind.turn}
-    return fine_motion(kind.body, kind.law, gait, delta, mesh.edges, tolerance, shares, **asked)
+    body, law, regime = kind.body, kind.law, kind.regime
+    if not kind.followed:
+        return fine_motion(
+            body, law, gait, delta, mesh.edges, tolerance, control.aims.objective,
+            quantities=control.aims.integrals, turn=kind.turn, periods=kind.periods,
+        )  # fmt: skip
+    on_mesh = _collocate(control, mesh, gait, delta)
+    counts = sum(map(abs, control.aims.objective.shares(on_mesh.period).values()))
+    error = tolerance / counts if np.isfinite(counts) else tolerance
+    if hasattr(regime, "reference"):
+        return regime.reference(control, gait, delta, mesh, error)
+    if regime.froude:
+        paced = regime.at(gait)
+        moving = GaitWithInertia(
+            body, law, gait, delta, froude=paced.froude, turn=kind.turn, regime=paced
+        )
+        begin, _, slopes = moving.rough_period(on_mesh.along.edges[:, 0])
+        times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
+        run = moving.periodic_run(begin, max(error / times, LEAST), slopes)
+        alone = kind.alone  # type: ignore[attr-defined]
+        return ReferenceMotion(run.course.at, times * run.aim, alone=alone)
+    if regime.slides:
+        asked = [each for each in control.aims.integrals if each.needs_forces]
+        on = GaitOnSlope(body, law, gait, delta, regime.grade, gait.corner_phases)
+        ran = on.integrate(gait.theta, error)
+        return ReferenceMotion(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
+    raise NotImplementedError(
+        f"no differential equation is known for {type(regime).__name__}: give it a reference."
+    )
 
 
 def mesh_error(
@@ -106,7 +133,7 @@ def mesh_error(
         violation=violation,
         total=objective(seen) / objective(_exact(known)[1]) - 1,
         unresolved=float(fine.unresolved.sum()),
-        turning=abs(float(_turning(known, cells).sum())),
+        turning=abs(float(cells.turning.sum())),
     )
 
 
@@ -134,18 +161,11 @@ def _first_order(
     return value
 
 
-def interval_shares(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Magnitudes of what intervals add to the relative error of the objective and to the
-    turning."""
-    cells = _collocated_cells(known, rule, left, right)
-    return np.abs(cells.value) + np.abs(_turning(known, cells))
-
-
 class _Cells(NamedTuple):
     """Intervals by a scheme, with their errors."""
 
-    rotation: np.ndarray
     value: np.ndarray
+    turning: np.ndarray
     pose: CollocatedPose
     totals: np.ndarray  # work and integrals, (1 + k,)
 
@@ -153,9 +173,11 @@ class _Cells(NamedTuple):
 def _collocated_cells(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Cells:
     (control, gait, delta, fine), h = known, right - left
     nodes = left[:, None] + h[:, None] * rule.c
-    asked: Any = {"quantities": control.aims.integrals, "turn": control.dynamics.turn}
-    at = control.dynamics.body, control.dynamics.law, gait, delta, nodes
-    rates = rates_at(*at, near=fine.velocity(nodes), **asked)
+    kind = control.dynamics
+    rates = rates_at(
+        kind.body, kind.law, gait, delta, nodes, near=fine.velocity(nodes),
+        quantities=control.aims.integrals, turn=kind.turn,
+    )  # fmt: skip
     pose = CollocatedPose(rule, h, rates.z[2], rates.centre)
     totals = (h[:, None] * rule.b * rates.gained).sum(axis=2)
     (theta, path, *before), (theta_right, path_right, *after) = fine.at(left), fine.at(right)
@@ -165,12 +187,16 @@ def _collocated_cells(known: Known, rule: Scheme, left: np.ndarray, right: np.nd
     # an error of rotation turns everything after it
     added = displacement + 1j * rotation * (fine.path[-1] - path_right)
     value = _first_order(control, *_exact(known), rotation, added, gained[0], gained[1:])
-    return _Cells(rotation, value, pose, totals.sum(axis=1))
+    closed = control.admissible.gait.symmetry != NONE
+    turning = rotation * (0.0 if closed else 0.5 / abs(fine.path[-1]))
+    return _Cells(value, turning, pose, totals.sum(axis=1))
 
 
-def _turning(known: Known, cells: _Cells) -> np.ndarray:
-    closed = known.control.admissible.gait.symmetry != NONE
-    return cells.rotation * (0.0 if closed else 0.5 / abs(known.fine.path[-1]))
+def interval_shares(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Magnitudes of what intervals add to the relative error of the objective and to the
+    turning."""
+    cells = _collocated_cells(known, rule, left, right)
+    return np.abs(cells.value) + np.abs(cells.turning)
 
 
 def _period(
@@ -180,7 +206,7 @@ def _period(
     kind = known.control.dynamics
     passed = PeriodTotals(complex(end), float(rotation) - kind.turn, float(totals[0]))
     names = (each.name for each in known.control.aims.integrals)
-    return passed, period_of(kind, passed, dict(zip(names, totals[1:], strict=True)))
+    return passed, _period_of(kind, passed, dict(zip(names, totals[1:], strict=True)))
 
 
 def _exact(known: Known) -> tuple[PeriodTotals, dict[str, float]]:
@@ -188,10 +214,47 @@ def _exact(known: Known) -> tuple[PeriodTotals, dict[str, float]]:
     return _period(known, fine.path[-1], fine.theta[-1], fine.totals[:, -1])
 
 
+def _period_of(
+    kind: QuasiStatic, passed: PeriodTotals, sums: Mapping[str, Any]
+) -> dict[str, float]:
+    """Quantities of a period from those of the solved part."""
+    totals = {name: kind.periods * float(np.sum(part)) for name, part in sums.items()}
+    return kind.totals(passed) | totals
+
+
+class _Collocated(NamedTuple):
+    """A gait on a mesh."""
+
+    shapes: Shapes
+    along: Trajectory
+    pose: CollocatedPose
+    work: np.ndarray  # against friction, (n,)
+    integrals: dict[str, np.ndarray]  # of intervals
+    period: dict[str, float]
+
+
+def _collocate(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> _Collocated:
+    kind, weights = control.dynamics, stage_weights(mesh)
+    angles, rates = gait(mesh.times)
+    shapes = Shapes(angles, rates, delta)
+    along = kind.simulate(mesh, shapes, kind.static_of(gait))
+    theta = kind.initial_heading(along.static)
+    pose = CollocatedPose.on_mesh(mesh, along.now.z[OMEGA] - kind.turn, along.now.centre, theta)
+    now = kind.instants(shapes, pose.theta_on(mesh), along.now.z)
+    work = (weights * along.now.power[mesh.points]).sum(axis=1)
+    sums = {
+        each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1)
+        for each in control.aims.integrals
+    }
+    way, turn = complex(pose.place[-1]), float(pose.rotations.sum())
+    passed = PeriodTotals(way, turn, float(work.sum()), along.static)
+    return _Collocated(shapes, along, pose, work, sums, _period_of(kind, passed, sums))
+
+
 def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     """`MeshError` but for the violation."""
     (control, gait, delta, exact), kind = known, known.control.dynamics
-    aims, seen = control.aims, collocate(control, mesh, gait, delta)
+    aims, seen = control.aims, _collocate(control, mesh, gait, delta)
     shapes, along, pose = seen[:3]
     at_edges = exact.at(mesh.edges)
     angle, *place = at_edges[-4:-1]
@@ -206,7 +269,7 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
         else totals_along(each, gait, *_ends(mesh), 4)
         for each in aims.integrals
     }
-    period = period_of(kind, passed, integrals)
+    period = _period_of(kind, passed, integrals)
     weights = aims.objective.shares(period)
     rotation, energy = pose.rotations - theta, seen.work - work
     displacement = np.diff(pose.place) - (x + 1j * y)

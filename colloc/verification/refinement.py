@@ -16,10 +16,12 @@ import numpy as np
 
 from colloc.dynamics.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyGait
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme, scheme
-from colloc.verification.adaptive_motion import FineMotion
-from colloc.verification.kinks import kink_phases
+from colloc.verification.adaptive_motion import FineMotion, Path, rates_at
 from colloc.verification.mesh_error import FINER, Known, gait_motion, interval_shares, mesh_error
 
 VIOLATION = 5e-7
@@ -44,6 +46,10 @@ _ONE_KINK = 0.02 / 16
 _LEFT = 0.2  # mean intervals by which a kink may have moved from the knot that it left
 _NARROWEST = 1e-7
 _WORST = 0.1  # of the largest error: with states, intervals below it are not cut
+_SLOW = 30.0
+"""A point counts as at rest below this many delta."""
+_ZOOMS, _SAMPLES = 5, 9
+_SEPARATE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,17 +60,54 @@ class MeshPlan:
     reached: bool  # whether that is below the request
     kept: np.ndarray  # phases that have to stay knots, as they split violating intervals
 
+    @property
+    def points(self) -> float:
+        rule = scheme(self.scheme)
+        return (self.edges.size - 1) * (rule.s - rule.left)
 
-def kink_knots(
-    control: ControlProblem, gait: AnyGait, delta: float, fine: FineMotion
+
+def kink_phases(
+    body: Body, friction: Law, path: Path, delta: float, fine: FineMotion, apart: float = _SEPARATE
 ) -> np.ndarray:
-    """Phases of the kinks of a gait's velocities, one for each group of very close ones."""
-    apart = _ONE_KINK * control.admissible.fraction
-    knots: list[float] = []
-    for kink in kink_phases(control.dynamics.body, control.dynamics.law, gait, delta, fine):
-        if not knots or kink - knots[-1] > apart:
-            knots.append(float(kink))
-    return np.array(knots)
+    """Phases of kinks and jumps of a gait's velocities inside its solved part, ascending and
+    farther `apart`; delta is per period.
+
+    The balance changes like x log|x| where a link slides on with its centre of rotation inside,
+    like |x| when it comes to rest; where mu_f and mu_b differ, also where the tangential velocity
+    changes its sign; and where a balance ends in a fold, the body jumps. Smooth bodies, and drag,
+    make no kinks.
+    """
+
+    def slowness(t: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Speeds that vanish at kinks, ``(n_part, n_time)``."""
+        if not (isinstance(body, Chain) and body.law(friction).regularised):
+            return np.empty((0, t.size))
+        angles, rates = path(t)
+        velocity = body.velocity(body.posture(angles), rates, z)
+        return body.contact.sticking_speeds(friction, velocity)
+
+    t, velocity = fine.nodes.ravel(), fine.rates.z.reshape(3, -1)
+    speed = slowness(t, velocity)
+    inner = speed[:, 1:-1]
+    link, index = np.nonzero((inner <= speed[:, :-2]) & (inner <= speed[:, 2:]))
+    centre, least = t[index + 1], inner[link, index]
+    radius, rows = np.maximum(t[index + 2] - centre, centre - t[index]), np.arange(centre.size)
+    for _ in range(_ZOOMS if centre.size else 0):
+        near = centre[:, None] + radius[:, None] * np.linspace(-1, 1, _SAMPLES)
+        z = rates_at(body, friction, path, delta, near, near=fine.velocity(near)).z.reshape(3, -1)
+        sampled = slowness(near.ravel(), z)[np.repeat(link, _SAMPLES), np.arange(near.size)]
+        best = sampled.reshape(near.shape).argmin(axis=1)
+        centre, least = near[rows, best], sampled.reshape(near.shape)[rows, best]
+        radius *= 2.0 / (_SAMPLES - 1)
+    jumps = (np.abs(np.diff(velocity)).max(axis=0) > _SLOW * delta) & (np.diff(t) < _SEPARATE)
+    kinks = np.sort(np.concatenate([centre[least < _SLOW * delta], 0.5 * (t[1:] + t[:-1])[jumps]]))
+    kinks = kinks[(kinks > fine.edges[0] + _SEPARATE) & (kinks < fine.edges[-1] - _SEPARATE)]
+    kinks = kinks[np.diff(kinks, prepend=-np.inf) > _SEPARATE]
+    found: list[float] = []
+    for kink in kinks.tolist():
+        if not found or kink - found[-1] > apart:
+            found.append(kink)
+    return np.array(found)
 
 
 def move_knots(edges: np.ndarray, kinks: np.ndarray, snap: float = _SNAP) -> np.ndarray:
@@ -111,65 +154,47 @@ def plan_mesh(
     if accurate:
         edges = np.union1d(mesh.edges, knots)
         return MeshPlan(mesh.scheme.name, edges, error.estimate, True, knots)
-    rules, gaits = _family(scheme(control.scheme)), control.admissible.gait
+    gaits, rules = control.admissible.gait, [scheme(control.scheme)]
+    if match := re.fullmatch(r"(gauss|radau)-(\d+)", control.scheme):
+        more = [rules[0].s + n for n in _MORE_NODES]
+        rules += [scheme(f"{match[1]}-{s}") for s in more[1:] if s <= _MOST_NODES]
     asked: Any = {"kept": knots, "tolerance": tolerance, "aim": aim}
     if control.dynamics.followed:
         uniform = np.linspace(0.0, control.admissible.fraction, control.intervals + 1)
         first = np.union1d(mesh.edges if nested else uniform, knots)
         return _fewest(_halve(known, rule, first, budget=most_points, **asked) for rule in rules)
-    kinks = kink_knots(control, gait, delta, fine)
+    apart = _ONE_KINK * control.admissible.fraction
+    kinks = kink_phases(control.dynamics.body, control.dynamics.law, gait, delta, fine, apart)
     # where the rates jump edges may be added, not moved
     keeps = nested or gaits.relative_delta or not gaits.free
+    n = max(int(_COARSE * gaits.fraction), _A_HARMONIC * gaits.harmonics)
+    coarse = mesh.edges if keeps else np.linspace(mesh.edges[0], mesh.edges[-1], n + 1)
     best: MeshPlan | None = None
     for rule in rules:
         # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself
         # kinked
         switches = not control.dynamics.law.reversible and (rule.left or rule.right)
-        on_knots = kinks[:0] if switches else kinks
-        first = np.union1d(mesh.edges if keeps else coarse_edges(control, mesh.edges), knots)
-        targets = np.union1d(on_knots, _knots_left(mesh, on_knots))
-        edges = move_knots(first, targets, 0.0 if keeps else _SNAP)
-        budget = most_points if best is None else min(most_points, _points(best) / _HANDICAP)
+        targets = on_knots = kinks[:0] if switches else kinks
+        if on_knots.size:
+            # and the knots that the kinks have just left: collocation errs there in the optimiser's
+            # favour, and moving the knot after the kink repeats the chase
+            nearest = mesh.edges[np.abs(mesh.edges[:, None] - kinks).argmin(axis=0)]
+            just_left = np.abs(nearest - kinks) < _LEFT * np.diff(mesh.edges).mean()
+            targets = np.union1d(kinks, nearest[just_left])
+        edges = move_knots(np.union1d(coarse, knots), targets, 0.0 if keeps else _SNAP)
+        budget = most_points if best is None else min(most_points, best.points / _HANDICAP)
         plan = _split(known, rule, edges, on_knots, budget=budget, **asked)
         best = plan if best is None else _fewest([best, plan])
     return best
-
-
-def coarse_edges(control: ControlProblem, edges: np.ndarray) -> np.ndarray:
-    gait = control.admissible.gait
-    n = max(int(_COARSE * gait.fraction), _A_HARMONIC * gait.harmonics)
-    return np.linspace(edges[0], edges[-1], n + 1)
 
 
 def _fewest(plans: Iterable[MeshPlan]) -> MeshPlan:
     """The plan with the fewest points of those that reach the request; else the first."""
     best, *others = plans
     for plan in others:
-        if plan.reached and (not best.reached or _points(plan) * _HANDICAP < _points(best)):
+        if plan.reached and (not best.reached or plan.points * _HANDICAP < best.points):
             best = plan
     return best
-
-
-def _knots_left(mesh: Mesh, kinks: np.ndarray) -> np.ndarray:
-    """Knots that the kinks have just left: collocation errs there in the optimiser's favour, and
-    moving the knot after the kink repeats the chase."""
-    if kinks.size == 0:
-        return kinks
-    nearest = mesh.edges[np.abs(mesh.edges[:, None] - kinks).argmin(axis=0)]
-    return nearest[np.abs(nearest - kinks) < _LEFT * np.diff(mesh.edges).mean()]
-
-
-def _family(given: Scheme) -> list[Scheme]:
-    match = re.fullmatch(r"(gauss|radau)-(\d+)", given.name)
-    if not match:
-        return [given]
-    nodes = [given.s + more for more in _MORE_NODES if more == 0 or given.s + more <= _MOST_NODES]
-    return [scheme(f"{match[1]}-{s}") for s in nodes]
-
-
-def _points(plan: MeshPlan) -> float:
-    rule = scheme(plan.scheme)
-    return (plan.edges.size - 1) * (rule.s - rule.left)
 
 
 def _by_error(shares: np.ndarray, allowed: float) -> tuple[np.ndarray, int]:

@@ -1,8 +1,13 @@
 """Independent replay of a gait: distance, work and rotation from the joint angles alone.
 
-It shares nothing with collocation but the friction law: velocities by the NumPy solver at five
-instants of panels (`colloc.verification.panels`). Where several balance an instant, it follows one
-branch in time, and says how far the others would lead (`colloc.dynamics.branches`).
+It shares nothing with collocation but the physics at an instant: velocities at five instants of
+panels, Simpson's rule on each and on its halves, and the error that leaves. Where several balance
+an instant, it follows one branch in time, and says how far the others would lead
+(`colloc.dynamics.branches`).
+
+A kink of stick and slip may lie where halving its panel changes nothing, and halving that again
+much. So a panel is also judged by what halving would change if it lay one or two instants earlier
+or later, and the error follows from the falloff against the panel twice as wide.
 """
 
 from __future__ import annotations
@@ -10,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,69 +38,140 @@ from colloc.mechanics.densities import (
 from colloc.mechanics.law import Law
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
-from colloc.verification.panels import (
-    WHOLE,
-    Panels,
-    changes,
-    first_panels,
-    increments,
-    poses,
-    remaining_error,
-)
-from colloc.verification.replay_record import Path, Replay, lever
+from colloc.verification.adaptive_motion import Path, Replay, lever
+from colloc.verification.differential_motion import inertial_replay, slope_replay
 
 MOST_INSTANTS = 10_000_000
 """Of a first grid, which fill a gigabyte."""
 _NARROWEST = 1e-10
+HALF = np.array([[0.0, 0.0, 0.0], [5.0, 8.0, -1.0], [4.0, 16.0, 4.0]]) / 24
+"""Integrals from the first of three instants to each of the parabola through them, over the
+width."""
+WHOLE = np.zeros((5, 5))
+WHOLE[:3, :3] = 0.5 * HALF
+WHOLE[3:] = WHOLE[2]
+WHOLE[2:, 2:] += 0.5 * HALF
+"""`HALF` for five instants, parabola by parabola."""
+_SMOOTH = 1 / (2 * 16 * 15)
+"""What a rule of fourth order leaves of the change on the panel twice as wide in smooth motion."""
+_MARGIN = 1.25  # factor of safety where three grids tell the falloff (Roache, 1998)
+_KINK = 0.25
+"""What halving a panel with a kink leaves of its change: the width, and the lift of the
+parabola."""
+_BESIDE = 2
+"""Instants by which panels are moved at most: half of a panel."""
+_CORNER = 1e-6  # relative jump between neighbouring panels that is a corner or another branch
 
 
-class _Solver:
-    """Values of panels at instants, with the largest residual, lever and shares so far."""
+class Panels(NamedTuple):
+    """Panels in order of time, with values at five instants of each; k quantities."""
 
-    def __init__(
-        self,
-        body: Body,
-        friction: Law,
-        path: Path,
-        delta: float,
-        sense: int,
-        quantities: tuple[Quantity, ...],
-        limits: PathLimits,
-        turn: float,
-    ) -> None:
-        self.body, self.friction, self.path, self.delta = body, friction, path, delta
-        self.sense, self.quantities, self.limits, self.turn = sense, quantities, limits, turn
-        self.joint_map = getattr(path, "joint_map", None)
-        self.residual = self.lever = 0.0
-        self.shares = np.full(len(limits.names), -np.inf)
+    left: np.ndarray  # (n,)
+    width: np.ndarray
+    z: np.ndarray  # tail velocity, (n, 5, 3)
+    rates: np.ndarray
+    """Rotation rate from evenly turning axes, velocity of the centre of mass in the body frame,
+    power, densities: complex, ``(n, 5, 3 + k)``."""
+    joint_power: np.ndarray  # (n, 5)
+    apart: np.ndarray  # `colloc.dynamics.branches.FollowedMotion.apart`, (n, 5, 3 + k)
+    wider: np.ndarray  # `changes` of the panel that each is half of, (n, 3 + k)
 
-    def values(
-        self, t: np.ndarray, near: np.ndarray | None, *, whole: bool = False
-    ) -> tuple[np.ndarray, ...]:
-        """`Panels` z, rates, joint_power and apart at instants t ``(n, k)``, from the tail
-        velocities `near` ``(3, n k)``; of several motions the nearest, or of a `whole` period the
-        branch in time."""
-        angles, rates = self.path(t.ravel())
-        at = self.body, self.friction, angles, rates, self.delta
-        given: Any = {"quantities": self.quantities, "joint_map": self.joint_map}
-        start, apart = near, np.zeros((3 + len(self.quantities), t.size))
-        if not self.friction.associated:
-            before = None if whole else near
-            followed = followed_motion(*at, before=before, sense=self.sense, **given)
-            if followed is not None:
-                start, apart = np.nan_to_num(followed.z), followed.apart
-        motion, residual = accurate_motion(*at, start)
-        now = Instants(*at, z=motion.z, joint_map=self.joint_map)
-        self.residual = float(np.maximum(self.residual, residual.max()))
-        self.lever = max(self.lever, float(lever(self.body, angles).max()))
-        if self.limits.names:
-            used = self.limits.sizes(self.limits.at(now)).max(axis=1)
-            self.shares = np.maximum(self.shares, used)
-        densities = [quantity.at(now) for quantity in self.quantities]
-        centre = motion.centre[0] + 1j * motion.centre[1]
-        rows = np.vstack([motion.z[2] - self.turn, centre, motion.power, *densities])
-        found = motion.z, rows, motion.actuator_power, apart
-        return tuple(each.T.reshape(*t.shape, *each.shape[:-1]) for each in found)
+    def take(self, chosen: np.ndarray) -> Panels:
+        return Panels(*(a[chosen] for a in self))
+
+    def join(self, other: Panels) -> Panels:
+        both = Panels(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+        return both.take(np.argsort(both.left))
+
+    def halves(self, between: tuple[np.ndarray, ...], changed: np.ndarray) -> Panels:
+        """Both halves of each, from values (z, rates, joint_power, apart) between the instants
+        ``(n, 4)``, and what halving changed."""
+        fields = []
+        for old, new in zip(self[2:-1], between, strict=True):
+            merged = np.empty((len(old), 9, *old.shape[2:]), dtype=old.dtype)
+            merged[:, ::2], merged[:, 1::2] = old, new
+            both = np.stack([merged[:, :5], merged[:, 4:]], axis=1)
+            fields.append(both.reshape(2 * len(old), *old.shape[1:]))
+        left, width = np.repeat(self.left, 2), 0.5 * np.repeat(self.width, 2)
+        left[1::2] += width[1::2]
+        return Panels(left, width, *[*fields, np.repeat(changed, 2, axis=0)])
+
+
+def first_panels(left: np.ndarray, width: np.ndarray, values: tuple[np.ndarray, ...]) -> Panels:
+    """An even number of equal panels between any two corners, with the changes of their pairs."""
+    paired = [np.concatenate([a[::2, ::2], a[1::2, 2::2]], axis=1) for a in values]
+    pairs = Panels(left[::2], 2 * width[::2], *[*paired, np.empty(0)])
+    return Panels(left, width, *[*values, np.repeat(changes(pairs)[0], 2, axis=0)])
+
+
+def poses(turn: np.ndarray, move: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heading and place (complex) before every panel and after the last ``(n + 1,)``."""
+    heading = np.concatenate([[0.0], np.cumsum(turn)])
+    return heading, np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
+
+
+def increments(panels: Panels, rule: np.ndarray = WHOLE) -> tuple[np.ndarray, ...]:
+    """Rotation, displacement in the axes at the panel's begin (complex), work and integrals of
+    panels."""
+    every = 4 // (len(rule) - 1)
+    return _integrals(rule, panels.width, np.moveaxis(panels.rates[:, ::every], -1, 0))
+
+
+def _integrals(rule: np.ndarray, h: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, ...]:
+    """`increments` from rates ``(3 + k, ..., n, m)`` at m instants."""
+    omega, centre, others, b = rates[0].real, rates[1], rates[2:].real, rule[-1]
+    turn = np.exp(1j * h[:, None] * (omega @ rule.T))
+    return h * (omega @ b), h * ((turn * centre) @ b), *(h * (other @ b) for other in others)
+
+
+def changes(panels: Panels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Changes by halving each panel of the period's rotation, distance, work and integrals ``(n, 3
+    + k)``, and the largest if the panel lay up to one, and up to two instants beside;
+    magnitudes."""
+    heading, place = poses(*increments(panels)[:2])
+    rates, (index, seen) = np.moveaxis(panels.rates, -1, 0), _beside(panels)
+    more = rates[:, :, :4].reshape(len(rates), -1)[:, index]
+    extended = np.concatenate([more[..., :_BESIDE], rates, more[..., _BESIDE:]], axis=2)
+    inside = np.ones((panels.left.size, 5), dtype=bool)
+    known = np.concatenate([seen[:, :_BESIDE], inside, seen[:, _BESIDE:]], axis=1)
+    offsets = range(2 * _BESIDE + 1)
+    windows = np.stack([extended[..., k : k + 5] for k in offsets], axis=1)
+    there = np.stack([known[:, k : k + 5].all(axis=1) for k in offsets])
+    whole = _integrals(WHOLE, panels.width, windows)
+    once = _integrals(HALF, panels.width, windows[..., ::2])
+    turned, moved, *others = (a - b for a, b in zip(whole, once, strict=True))
+    # what comes after the panel turns with it
+    end = place[-1] - np.exp(1j * heading[:-1]) * moved - 1j * turned * (place[-1] - place[1:])
+    sizes = np.abs(np.stack([turned, abs(place[-1]) - np.abs(end), *others], axis=2))
+    sizes = sizes * there[..., None]
+    return sizes[_BESIDE], sizes[1:-1].max(axis=0), sizes.max(axis=0)
+
+
+def _beside(panels: Panels) -> tuple[np.ndarray, np.ndarray]:
+    """Indices among all instants of the two before and after each panel, at its spacing ``(n, 4)``;
+    and whether there are such, with no corner between."""
+    left, width = panels.left[:, None], panels.width[:, None]
+    instants = (left + 0.25 * width * np.arange(4)).ravel()
+    state = np.concatenate([panels.z, panels.rates[:, :, 2:3].real], axis=2)
+    steps = np.abs(state[:, 4] - np.roll(state[:, 0], -1, axis=0))
+    corners = (steps > _CORNER * np.abs(state).max(axis=(0, 1))).any(axis=1)
+    stretch = np.concatenate([[0], np.cumsum(corners[:-1])])
+    if not corners[-1]:
+        stretch[stretch == stretch[-1]] = 0
+    wanted = left + 0.25 * width * np.array([*range(-_BESIDE, 0), *range(5, 5 + _BESIDE)])
+    slack = 0.05 * width
+    index = np.searchsorted(instants, wanted % 1.0 - slack) % instants.size
+    off = np.abs(instants[index] - wanted % 1.0)
+    seen = (np.minimum(off, 1 - off) < slack) & (stretch[index // 4] == stretch[:, None])
+    return index, seen & ~(corners[-1] & ((wanted < -slack) | (wanted > 1 - slack)))
+
+
+def remaining_error(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarray:
+    """Error of the halves of panels from the changes up to one and two instants beside them, and
+    from those of the panels twice as wide: the rest of a geometric series, which falls no faster
+    than at a kink, but no less than smooth motion would leave."""
+    falloff = np.minimum(2 * far / np.maximum(np.maximum(wider, far), 1e-300), _KINK)
+    return np.maximum(near * falloff / (1 - falloff), _MARGIN * _SMOOTH * wider)
 
 
 def replay(
@@ -168,9 +244,9 @@ def replay(
     0.26
     """
     if froude:
-        return replayer(Regime(froude=froude))(
-            body, friction, path, delta, tolerance=tolerance, breaks=breaks, objective=objective,
-            quantities=quantities, turn=turn,
+        return inertial_replay(
+            body, friction, path, delta, regime=Regime(froude=froude), tolerance=tolerance,
+            breaks=breaks, objective=objective, quantities=quantities, turn=turn,
         )  # fmt: skip
     if "period" in objective.uses:
         raise ProblemError(
@@ -186,8 +262,42 @@ def replay(
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     joint_map = getattr(path, "joint_map", None)
     limits = limits_of(limits, joint_map.n_motor if joint_map else body.n_joint)
-    solver = _Solver(body, law, path, delta, sense, asked, limits, turn)
-    panels = _grid(solver, instants, breaks, near)
+    residual, reach, shares = 0.0, 0.0, np.full(len(limits.names), -np.inf)
+
+    def state_at(
+        t: np.ndarray, start: np.ndarray | None, *, whole: bool = False
+    ) -> tuple[np.ndarray, ...]:
+        """`Panels` z, rates, joint_power and apart at instants t ``(n, k)``, from tail velocities
+        ``(3, n k)``; of several motions the nearest, or of a `whole` period the branch in time."""
+        nonlocal residual, reach, shares
+        angles, rates = path(t.ravel())
+        at, before = (body, law, angles, rates, delta), None if whole else start
+        how: Any = {"quantities": asked, "joint_map": joint_map, "sense": sense}
+        followed = None if law.associated else followed_motion(*at, before=before, **how)
+        apart = np.zeros((3 + len(asked), t.size))
+        if followed is not None:
+            start, apart = np.nan_to_num(followed.z), followed.apart
+        motion, left_over = accurate_motion(*at, start)
+        now = Instants(*at, z=motion.z, joint_map=joint_map)
+        residual = float(np.maximum(residual, left_over.max()))
+        reach = max(reach, lever(body, angles))
+        if limits.names:
+            shares = np.maximum(shares, limits.sizes(limits.at(now)).max(axis=1))
+        centre = motion.centre[0] + 1j * motion.centre[1]
+        densities = [quantity.at(now) for quantity in asked]
+        rows = np.vstack([motion.z[2] - turn, centre, motion.power, *densities])
+        found = motion.z, rows, motion.actuator_power, apart
+        return tuple(each.T.reshape(*t.shape, *each.shape[:-1]) for each in found)
+
+    # equal panels between any two corners, where rates are one-sided
+    ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
+    pieces = [(a, b, 2 * max(1, round(instants * (b - a) / 8))) for a, b in pairwise(ends)]
+    edges = np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), 1.0)
+    t = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, 5)
+    t[np.isin(edges[:-1], breaks), 0] += ONE_SIDED
+    t[np.isin(edges[1:], breaks), 4] -= ONE_SIDED
+    first = None if near is None else near.tail_velocity(t.ravel())
+    panels = first_panels(edges[:-1], np.diff(edges), state_at(t, first, whole=True))
     names = "rotation", "distance", "work", *(each.name for each in asked)
     chord = chord_per_way(turn)
     while True:
@@ -207,11 +317,15 @@ def replay(
         missed[1] *= chord
         lost = dict(zip(names, missed, strict=True))
         gap = objective.relative_error(values, lost)
-        order, residual = np.argsort(gap), solver.residual
+        order = np.argsort(gap)
         # finer panels do not make up for what the balance leaves over
         excess = (np.cumsum(gap[order]) + residual > tolerance) & (residual < tolerance)
         excess &= panels.width[order] > _NARROWEST
-        chosen = _with_wider_neighbours(order[excess], panels.width)
+        # and neighbours that are not narrower: halves are judged with instants beside them
+        narrow = np.full(order.size, np.inf)
+        narrow[order[excess]] = panels.width[order[excess]]
+        beside = np.minimum(np.roll(narrow, 1), np.roll(narrow, -1))
+        chosen = np.flatnonzero((panels.width >= beside) | np.isfinite(narrow))
         if chosen.size == 0 or 4 * (panels.left.size + chosen.size) > most_instants:
             break
         old = panels.take(chosen)
@@ -220,78 +334,43 @@ def replay(
             start = 0.5 * (old.z[:, :-1] + old.z[:, 1:])
         else:  # the branch on which the body is before
             start = old.z[:, :-1] if sense == FORWARDS else old.z[:, 1:]
-        halves = old.halves(solver.values(middles, start.reshape(-1, 3).T), changed[chosen])
+        halves = old.halves(state_at(middles, start.reshape(-1, 3).T), changed[chosen])
         panels = panels.take(np.setdiff1d(order, chosen)).join(halves)
-    several, others = _others(panels, float(np.abs(place - place[-1]).max()))
+    # of two neighbouring instants the one at which others lead farther counts between them; a
+    # rotation moves all of the way
+    worse = np.maximum(panels.apart[:, :-1], panels.apart[:, 1:])
+    off = np.einsum("n,nki->i", 0.25 * panels.width, worse)
+    others = [off[1], off[0] + np.abs(place - place[-1]).max() * off[1], *off[2:]]
+    several = float(0.25 * panels.width @ worse.any(axis=2).sum(axis=1))
     known = panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)
     known[np.isin(panels.left, breaks), 0] += ONE_SIDED
     # what the balance leaves over counts in proportion to each
     forces = [each.needs_forces * abs(values[each.name]) for each in asked]
-    off = [1.0, values["distance"], values["work"], *forces]
+    sizes = [1.0, values["distance"], values["work"], *forces]
     return Replay(
         values=values,
         errors={
             name: float(lost[name].sum() + residual * size)
-            for name, size in zip(names, off, strict=True)
+            for name, size in zip(names, sizes, strict=True)
         },
-        others=dict(zip(names, others, strict=True)),
-        lever=solver.lever,
+        others=dict(zip(names, map(float, others), strict=True)),
+        lever=reach,
         actuator_work=float(((panels.joint_power @ WHOLE[-1]) * panels.width).sum()),
         residual=residual,
         error=float(gap.sum()) + residual,
         several=several,
         instants=4 * panels.left.size,
         tail=(known.ravel(), panels.z[:, :4].reshape(-1, 3).T),
-        shares=solver.shares,
+        shares=shares,
         objective=objective,
     )
-
-
-def _grid(
-    solver: _Solver, instants: int, breaks: np.ndarray | tuple[float, ...], near: Replay | None
-) -> Panels:
-    """Equal panels between any two corners, where rates are one-sided."""
-    ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
-    counts = [2 * max(1, round(instants * (b - a) / 8)) for a, b in pairwise(ends)]
-    pieces = zip(pairwise(ends), counts, strict=True)
-    edges = np.concatenate([*(np.linspace(a, b, n + 1)[:-1] for (a, b), n in pieces), [1.0]])
-    left, width = edges[:-1], np.diff(edges)
-    t = left[:, None] + width[:, None] * np.linspace(0.0, 1.0, 5)
-    t[np.isin(left, breaks), 0] += ONE_SIDED
-    t[np.isin(edges[1:], breaks), 4] -= ONE_SIDED
-    start = None if near is None else near.tail_velocity(t.ravel())
-    return first_panels(left, width, solver.values(t, start, whole=True))
-
-
-def _with_wider_neighbours(chosen: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Add neighbours that are not narrower: halves are judged with instants beside them."""
-    narrow = np.full(width.size, np.inf)
-    narrow[chosen] = width[chosen]
-    beside = np.minimum(np.roll(narrow, 1), np.roll(narrow, -1))
-    return np.flatnonzero((width >= beside) | np.isfinite(narrow))
-
-
-def _others(panels: Panels, reach: float) -> tuple[float, list[float]]:
-    """Part of the period with several motions, and how far any others would lead at most: rotation,
-    distance, work, integrals; a rotation moves what is within `reach`."""
-    worse = np.maximum(panels.apart[:, :-1], panels.apart[:, 1:])
-    speed, spin, *others = map(float, np.einsum("n,nki->i", 0.25 * panels.width, worse))
-    several = 0.25 * panels.width @ worse.any(axis=2).sum(axis=1)
-    return float(several), [spin, speed + reach * spin, *others]
 
 
 def replayer(regime: Regime) -> Callable[..., Replay]:
     """The replay of a regime, with the arguments of `replay`; a regime of one's own has it as
     ``replay``."""
-    own = getattr(regime, "replay", None)
-    if own is not None:
-        return own
+    if hasattr(regime, "replay"):
+        return regime.replay
     if regime.froude:
-        from colloc.verification.inertial_motion import inertial_replay  # loads what integrates
-
         return partial(inertial_replay, regime=regime)
-    if regime.slides:
-        from colloc.verification.slope import slope_replay
-
-        return partial(slope_replay, slope=regime)
-    return replay
+    return partial(slope_replay, slope=regime) if regime.slides else replay

@@ -17,7 +17,7 @@ import numpy as np
 
 from colloc.system.arguments import shown
 from colloc.system.errors import ProblemError
-from colloc.verification.replay_record import Path
+from colloc.verification.adaptive_motion import Path
 
 _PHASES = np.linspace(0.0, 1.0, 20001)
 MOST_SAMPLES = 2_000_000
@@ -48,6 +48,8 @@ def plan_trajectory(
     The period [s] is rounded up to whole samples; by default it is the shortest within the limits.
     To keep the gait's pace, limits make it longer. `ProblemError` for what cannot be.
     """
+    from scipy.optimize import brentq
+
     if not np.isfinite(rate) or rate <= 0:
         raise ProblemError(f"the sample rate must be positive, not {rate:g}.")
     vertices, _ = path(_PHASES)
@@ -73,18 +75,20 @@ def plan_trajectory(
             f"{count:g} samples a period are too {'few' if count < 4 else 'many'}; change the rate "
             f"or the period."
         )
-    period = count / rate
-    pace = np.maximum(_level(slowest, period), slowest)
-    clock = np.concatenate([[0.0], np.cumsum(pace) / pace.size])
+    period, level = count / rate, 0.0
+
+    def excess(level: float) -> float:
+        return float(np.maximum(level, slowest).mean()) - period
+
+    if excess(0.0) < 0:
+        level = float(brentq(excess, 0.0, 2 * period, xtol=1e-14, rtol=1e-14))
+    pace = np.maximum(level, slowest)
+    clock = np.append(0.0, np.cumsum(pace) / pace.size)
     clock *= period / clock[-1]
     time = np.arange(count) / rate
-    phase, angles = _by_clock(time, clock, _PHASES[None])[0], _by_clock(time, clock, vertices)
+    phase, *angles = (np.interp(time, clock, row) for row in (_PHASES, *vertices))
     speeds = _within(path(phase)[1], pace, clock, time, most)
-    return Trajectory(time, phase, angles, speeds, period)
-
-
-def _by_clock(time: np.ndarray, clock: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    return np.array([np.interp(time, clock, row) for row in rows])
+    return Trajectory(time, phase, np.array(angles), speeds, period)
 
 
 def _within(
@@ -109,21 +113,23 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approac
     """
     from scipy.interpolate import CubicHermiteSpline
 
-    both = (trajectory.angles, trajectory.speeds)
+    period, both = trajectory.period, (trajectory.angles, trajectory.speeds)
     closed = (np.append(rows, rows[:, :1], axis=1) for rows in both)
-    cycle = CubicHermiteSpline(np.append(trajectory.time, trajectory.period), *closed, axis=1)
+    cycle = CubicHermiteSpline(np.append(trajectory.time, period), *closed, axis=1)
     share = np.linspace(0.0, 1.0, _APPROACH + 1)
     grown = share**3 * (10.0 + share * (6.0 * share - 15.0))
-    growth = 30.0 * share**2 * (1.0 - share) ** 2 / trajectory.period
-    bent, turning = cycle(share * trajectory.period), cycle(share * trajectory.period, 1)
+    growth = 30.0 * share**2 * (1.0 - share) ** 2 / period
+    bent, turning = cycle(share * period), cycle(share * period, 1)
     angles, speeds = grown * bent + 0.0, grown * turning + growth * bent + 0.0  # no -0
-    step = trajectory.period / _APPROACH
+    step = period / _APPROACH
     pace = np.maximum(1.0, np.abs(np.diff(angles) / step / limits[:, None]).max(axis=0))
     clock = np.append(0.0, np.cumsum(pace)) * step
     time = np.arange(-int(np.ceil(clock[-1] * rate - 1e-9)), 0) / rate
     at = time + clock[-1]
-    sampled = _by_clock(at, clock, speeds)
-    return Approach(time, _by_clock(at, clock, angles), _within(sampled, pace, clock, at, limits))
+    angles, speeds = (
+        np.array([np.interp(at, clock, r) for r in rows]) for rows in (angles, speeds)
+    )
+    return Approach(time, angles, _within(speeds, pace, clock, at, limits))
 
 
 def shortest_period(path: Path, limits: np.ndarray, *, keep_pace: bool = False) -> float:
@@ -151,15 +157,3 @@ def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: s
     if not np.isfinite(given).all() or given.min() <= 0:
         raise ProblemError(f"{what}s must be positive, not {given.tolist()}.")
     return np.broadcast_to(given, n_joint)
-
-
-def _level(slowest: np.ndarray, period: float) -> float:
-    """The even pace that lower bounds are raised to so that the mean of the larger is `period`."""
-    from scipy.optimize import brentq
-
-    def excess(level: float) -> float:
-        return float(np.maximum(level, slowest).mean()) - period
-
-    if excess(0.0) >= 0:
-        return 0.0
-    return float(brentq(excess, 0.0, 2 * period, xtol=1e-14, rtol=1e-14))

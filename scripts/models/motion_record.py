@@ -12,7 +12,7 @@ from colloc.mechanics.balance import instant
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.verification.replay_record import Path
+from colloc.verification.adaptive_motion import Path
 
 
 class Record(NamedTuple):

@@ -24,8 +24,8 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.system.errors import ProblemError
+from colloc.verification.adaptive_motion import Replay
 from colloc.verification.replay import replay
-from colloc.verification.replay_record import Replay
 from scripts.models.ellipses import ellipse_angles, largest_amplitude
 from scripts.models.velocity_map import VelocityMap
 from scripts.paper.parallel import parallel_map

@@ -9,8 +9,8 @@ import numpy as np
 
 from colloc.gaits.harmonic import ellipse
 from colloc.mechanics.fixed_point import solve_balance
+from colloc.verification.adaptive_motion import Path
 from colloc.verification.replay import replay
-from colloc.verification.replay_record import Path
 from scripts.models.ellipses import GaitGrid, gait_grid, largest_amplitude
 from scripts.models.motion_record import record
 from scripts.models.sweep import Route, distinct_maxima, performance

@@ -20,10 +20,9 @@ from colloc.mechanics.densities import LENGTH, Instants
 from colloc.mechanics.fixed_point import chain_motion, motion_and_derivatives, solve_balance
 from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
-from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.reference_motion import ReferenceMotion
+from colloc.verification.adaptive_motion import Replay, to_tolerance, whole_totals
+from colloc.verification.mesh_error import ReferenceMotion
 from colloc.verification.replay import replay, replayer
-from colloc.verification.replay_record import Replay, to_tolerance
 
 
 class PushedMotion(QuasiStatic):

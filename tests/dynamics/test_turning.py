@@ -11,7 +11,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.results.motion import arc
 from colloc.search.spaces import space_near
 from colloc.transcription.full_program import full_program
-from colloc.verification.inertial_motion import inertial_replay
+from colloc.verification.differential_motion import inertial_replay
 from colloc.verification.mesh_error import mesh_error
 from tests.shared.cases import cases
 

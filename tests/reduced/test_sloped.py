@@ -25,7 +25,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver
 from colloc.search.spaces import space_near
 from colloc.transcription.full_program import full_program
-from colloc.verification.slope import slope_motion
+from colloc.verification.differential_motion import slope_motion
 
 
 def bump(t):

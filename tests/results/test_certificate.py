@@ -20,8 +20,8 @@ from colloc.results.store import save
 from colloc.search import certify as verify
 from colloc.search.certify import certify, gait_certificate
 from colloc.verification import replay as replay_module
+from colloc.verification.differential_motion import slope_motion
 from colloc.verification.replay import replay
-from colloc.verification.slope import slope_motion
 
 JUST_BELOW, JUST_ABOVE = 0.95, 1.05
 

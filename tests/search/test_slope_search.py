@@ -13,8 +13,8 @@ from colloc.reduced.program import ReducedProgram
 from colloc.search.certify import gait_certificate
 from colloc.search.solve import solve
 from colloc.search.spaces import space_near
+from colloc.verification.differential_motion import slope_motion
 from colloc.verification.mesh_error import mesh_error
-from colloc.verification.slope import slope_motion
 
 PROBLEM = Problem(
     "climber", ellipse(0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, grade=0.1

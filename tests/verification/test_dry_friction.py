@@ -9,8 +9,7 @@ from scipy import sparse
 import colloc
 from colloc import Chain, Elliptic, Foot, Friction
 from colloc.system.errors import ProblemError
-from colloc.verification.dry_balance import dry_balance
-from colloc.verification.dry_friction import dry_friction
+from colloc.verification.dry_friction import dry_balance, dry_friction
 
 ISOTROPIC, ELLIPTIC = Friction(), Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0)
 UNEVEN = Chain(

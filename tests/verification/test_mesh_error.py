@@ -21,9 +21,8 @@ from colloc.search import refine
 from colloc.search.solve import solve
 from colloc.verification import refinement
 from colloc.verification.adaptive_motion import fine_motion, rates_at
-from colloc.verification.kinks import kink_phases
 from colloc.verification.mesh_error import constraint_violation, gait_motion, mesh_error
-from colloc.verification.refinement import kink_knots, move_knots, plan_mesh
+from colloc.verification.refinement import kink_phases, move_knots, plan_mesh
 from colloc.verification.replay import replay
 from tests.shared.stages import answer_near
 
@@ -53,6 +52,21 @@ def path(t):
     return GAIT.angles(t), GAIT.rates(t)
 
 
+def error_of(stated, mesh=None, gait=GAIT, tolerance=1e-6, delta=DELTA):
+    control = control_problem(stated)
+    return mesh_error(control, mesh or control.mesh(), gait, delta, tolerance)
+
+
+def planned(stated, mesh=None, tolerance=1e-6, **how):
+    control = control_problem(stated)
+    return plan_mesh(control, mesh or control.mesh(), GAIT, DELTA, tolerance, **how)
+
+
+def fine_of(stated, mesh=None, gait=GAIT, tolerance=1e-6):
+    control = control_problem(stated)
+    return gait_motion(control, gait, DELTA, mesh or control.mesh(), tolerance)
+
+
 @pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)], ids=str)
 def test_adaptive_panels_agree_with_a_uniform_replay(friction):
     fine = fine_motion(problem().body, friction, path, DELTA, np.linspace(0, 1, 21), 1e-8)
@@ -73,7 +87,7 @@ def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, fri
     # collocating a given gait, by the scheme's own quadrature written out here
     stated = problem(name, friction)
     mesh = control_problem(stated).mesh()
-    error = mesh_error(control_problem(stated), mesh, GAIT, DELTA, 1e-7)
+    error = error_of(stated, tolerance=1e-7)
     t = mesh.edges[:-1, None] + mesh.h[:, None] * mesh.scheme.c
     rates = rates_at(stated.body, friction, path, DELTA, t)
     theta, x, work = 0.0, 0.0, 0.0
@@ -94,7 +108,7 @@ def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, fri
 def test_shares_of_intervals_add_up_to_the_error_of_other_objectives(objective):
     """The total is known from the scheme's own increments and the fine motion alone."""
     stated = problem("trapezoid", objective=objective)
-    error = mesh_error(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-6)
+    error = error_of(stated)
     assert abs(error.total) > 1e-4
     assert error.value.sum() == pytest.approx(error.total, rel=0.1)
 
@@ -104,9 +118,8 @@ def test_shares_of_intervals_add_up_where_the_body_turns_in_half_a_period():
     both headings."""
     gait = Fourier(np.zeros(2), np.array([[1.5], [-1.0]]), np.array([[0.3], [1.0]]))
     stated = problem("trapezoid", gait=Harmonic(1, "antipodal"), intervals=40)
-    fine = gait_motion(control_problem(stated), gait, DELTA, control_problem(stated).mesh(), 1e-6)
-    assert abs(fine.theta[-1]) > 0.1
-    error = mesh_error(control_problem(stated), control_problem(stated).mesh(), gait, DELTA, 1e-6)
+    assert abs(fine_of(stated, gait=gait).theta[-1]) > 0.1
+    error = error_of(stated, gait=gait)
     assert error.value.sum() == pytest.approx(error.total, rel=0.02)
 
 
@@ -116,7 +129,7 @@ def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
     for name, order in (("gauss-2", 4), ("radau-2", 3), ("gauss-3", 6)):
         meshes = (Mesh(scheme(name), np.linspace(0, 0.5, n + 1)) for n in (20, 40))
         coarse, fine = (
-            np.abs(mesh_error(control_problem(stated), mesh, GAIT, 10.0, 1e-11).value).sum()
+            np.abs(error_of(stated, mesh, tolerance=1e-11, delta=10.0).value).sum()
             for mesh in meshes
         )
         assert np.log2(coarse / fine) == pytest.approx(order, abs=0.5)
@@ -125,9 +138,7 @@ def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
 @pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3)], ids=str)
 def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     stated = problem(friction=friction)
-    fine = gait_motion(
-        control_problem(stated), GAIT, DELTA, uniform_mesh(scheme("gauss-3"), 20, 0.5), 1e-6
-    )
+    fine = fine_of(stated, uniform_mesh(scheme("gauss-3"), 20, 0.5))
     kinks = kink_phases(stated.body, friction, path, DELTA, fine)
     assert 4 <= kinks.size <= 24
     # reversing the motion of the body about the middle of the half period maps kinks to kinks (A0 =
@@ -189,8 +200,8 @@ def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards
     """Schemes with nodes at the ends of an interval would have one there, and the efficiency a kink
     in the gait."""
     stated, kink = problem(friction=friction, scheme=rule, intervals=8), 0.1234
-    monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.array([kink]))
-    plan = plan_mesh(control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-4)
+    monkeypatch.setattr(refinement, "kink_phases", lambda *arguments: np.array([kink]))
+    plan = planned(stated, tolerance=1e-4)
     assert (kink in plan.edges) == held
 
 
@@ -203,14 +214,13 @@ def test_knots_move_onto_kinks_and_keep_the_rest():
 
 def test_knots_on_kinks_save_points(monkeypatch):
     stated = problem("gauss-7", intervals=16)
-    mesh = control_problem(stated).mesh()
-    with_knots = plan_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6)
-    monkeypatch.setattr(refinement, "kink_knots", lambda *arguments: np.empty(0))
-    without = plan_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6)
+    with_knots = planned(stated)
+    monkeypatch.setattr(refinement, "kink_phases", lambda *arguments: np.empty(0))
+    without = planned(stated)
     points = [(plan.edges.size - 1) * scheme(plan.scheme).s for plan in (with_knots, without)]
     assert points[0] < 0.9 * points[1]
-    fine = gait_motion(control_problem(stated), GAIT, DELTA, mesh, 1e-7)
-    knots = kink_knots(control_problem(stated), GAIT, DELTA, fine)
+    fine = fine_of(stated, tolerance=1e-7)
+    knots = kink_phases(stated.body, stated.friction, GAIT, DELTA, fine, 0.02 / 32)
     assert np.abs(with_knots.edges[:, None] - knots).min(axis=0).max() < 1e-4
 
 
@@ -218,51 +228,28 @@ def test_knots_on_kinks_save_points(monkeypatch):
 def test_planned_meshes_are_as_accurate_as_they_say(name):
     stated = problem(name)
     for tolerance in (1e-4, 1e-6):
-        plan = plan_mesh(
-            control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, tolerance
-        )
+        plan = planned(stated, tolerance=tolerance)
         assert plan.reached
-        error = mesh_error(
-            control_problem(stated),
-            Mesh(scheme(plan.scheme), plan.edges),
-            GAIT,
-            DELTA,
-            0.1 * tolerance,
-        )
+        mesh = Mesh(scheme(plan.scheme), plan.edges)
+        error = error_of(stated, mesh, tolerance=0.1 * tolerance)
         assert abs(error.total) <= error.estimate <= 1.1 * tolerance
-        again = plan_mesh(
-            control_problem(stated),
-            Mesh(scheme(plan.scheme), plan.edges),
-            GAIT,
-            DELTA,
-            1.1 * tolerance,
-        )
-        assert again is None
+        assert planned(stated, mesh, 1.1 * tolerance) is None
 
 
 def test_a_nested_mesh_has_every_knot_of_the_one_before():
     stated = problem("gauss-3")
-    mesh = control_problem(stated).mesh()
-    plan, free = (
-        plan_mesh(control_problem(stated), mesh, GAIT, DELTA, 1e-6, nested=nested)
-        for nested in (True, False)
-    )
-    assert np.isin(mesh.edges, plan.edges).all()
-    assert not np.isin(mesh.edges, free.edges).all()
+    edges = control_problem(stated).mesh().edges
+    plan, free = (planned(stated, nested=nested) for nested in (True, False))
+    assert np.isin(edges, plan.edges).all()
+    assert not np.isin(edges, free.edges).all()
     assert plan.reached
-    assert (
-        mesh_error(
-            control_problem(stated), Mesh(scheme(plan.scheme), plan.edges), GAIT, DELTA, 1e-7
-        ).estimate
-        <= 1.1e-6
-    )
+    mesh = Mesh(scheme(plan.scheme), plan.edges)
+    assert error_of(stated, mesh, tolerance=1e-7).estimate <= 1.1e-6
 
 
 def test_an_exhausted_budget_is_said_and_no_success(monkeypatch):
     stated = problem("gauss-2", mesh_tolerance=1e-7, intervals=20)
-    plan = plan_mesh(
-        control_problem(stated), control_problem(stated).mesh(), GAIT, DELTA, 1e-7, most_points=60
-    )
+    plan = planned(stated, tolerance=1e-7, most_points=60)
     assert not plan.reached
     assert plan.estimate > 1e-7
     small = plan_mesh
@@ -279,13 +266,7 @@ def test_a_refined_solution_knows_its_scheme_and_its_error():
     assert answer.optimal
     assert answer.scheme == answer.mesh.scheme.name != "gauss-2"
     gait = answer.gait
-    known = replay(
-        stated.body,
-        stated.friction,
-        lambda t: (gait.angles(t), gait.rates(t)),
-        DELTA,
-        tolerance=1e-8,
-    )
+    known = replay(stated.body, stated.friction, gait, DELTA, tolerance=1e-8)
     assert abs(answer.efficiency / known.efficiency - 1) < 1e-5
 
 

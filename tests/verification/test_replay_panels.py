@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.audit import path_of, random_problem
-from colloc.verification.panels import (
+from colloc.verification.replay import (
     HALF,
     Panels,
     changes,
@@ -15,8 +15,8 @@ from colloc.verification.panels import (
     increments,
     poses,
     remaining_error,
+    replay,
 )
-from colloc.verification.replay import replay
 from tests.conftest import ROOT
 
 WORK = 2

@@ -8,8 +8,8 @@ from benchmarks.stated_errors import motion, random_case, slope
 from colloc import Chain, Fourier, Friction, Harmonic, Problem
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.objective import EFFICIENCY
-from colloc.verification.reference_motion import reference_motion
-from colloc.verification.replay_record import to_tolerance
+from colloc.verification.adaptive_motion import to_tolerance
+from colloc.verification.mesh_error import gait_motion
 
 LEANING = Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 
@@ -42,5 +42,5 @@ def test_meshes_are_held_against_a_motion_whose_error_is_known_where_friction_ha
         Problem("w", LEANING, Chain(), froude=1.0, delta_start=1e-3, intervals=10, **asked)
     )
     mesh = control.mesh()
-    rough, fine = (reference_motion(control, LEANING, 1e-3, mesh, aim) for aim in (1e-4, 1e-7))
+    rough, fine = (gait_motion(control, LEANING, 1e-3, mesh, aim) for aim in (1e-4, 1e-7))
     assert np.abs(rough.at(mesh.edges) - fine.at(mesh.edges)).max() < rough.error < 1e-5

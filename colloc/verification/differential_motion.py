@@ -1,12 +1,23 @@
-"""Gaits with inertia by shooting: Adams' and Gear's methods, and Newton's on the map of a period.
+r"""Motions by differential equations: on slopes, where the heading is a state, and with inertia,
+where momenta are. Nothing is shared with collocation but the forces.
 
-At the Froude number Fr = L/(g T^2) mass times acceleration counts against friction as Fr to mu; at
-0 this is `colloc.replay`. Nothing is shared with collocation but the forces.
+*Slopes.* On a plane of grade g, the tangent of its inclination, the body presses on the ground with
+a force of 1. With theta the angle of the tail link from straight uphill, the weight pulls with ``-g
+e^(-i theta)`` in the body's axes, the balance gives velocities that depend on theta, and
+
+    d theta/dt = omega(q, q', theta),      d x/dt = e^(i theta) c(q, q', theta),
+
+c being the velocity of the centre of mass in the body's axes and x its place, real part uphill. The
+work of the joints, by their moments, is the work against friction + g climb.
+
+*Inertia.* At the Froude number Fr = L/(g T^2) mass times acceleration counts against friction as Fr
+to mu; at 0 this is `colloc.replay`. The period that leaves the momenta as they are is found by
+shooting: Adams' and Gear's methods, and Newton's on the map of a period.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
@@ -14,28 +25,44 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.dynamics.chain import MomentaAt, joint_torques
+from colloc.dynamics.chain import MomentaAt, balance_on_slope, joint_torques
 from colloc.dynamics.follow import ONE_SIDED, STEP, Course, integrate_period
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period, chord_per_way
-from colloc.gaits.regime import LEVEL, Regime
+from colloc.gaits.regime import LEVEL, Regime, checked_chain
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import LENGTH, Instants, PathLimits, Quantity, quantities_of
+from colloc.mechanics.densities import (
+    LENGTH,
+    Instants,
+    PathLimit,
+    PathLimits,
+    Quantity,
+    limits_of,
+    quantities_of,
+)
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_mass, kinetic_energy, momenta, tail_velocity
 from colloc.mechanics.law import Law
+from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
 from colloc.system.errors import NotConvergedError
-from colloc.verification.adaptive_motion import whole_totals
-from colloc.verification.replay_record import (
+from colloc.verification.adaptive_motion import (
+    PANEL_RULE,
     Numbers,
     Path,
     Replay,
+    fine_motion,
     lever,
-    through_periods,
     to_tolerance,
+    whole_totals,
 )
 
+_UNITS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
+"""Units of the errors of theta, place, works, and of the logarithm of the steering."""
+_LOOSER = 30.0  # error of the run that states the error, over that of the run it is of
+_PANELS = 40
+_FIRST = 0.1  # error of the first run of a replay, over the relative one that is asked for
+_LONGEST = 4.0  # longest step of a replay, in instants of a uniform grid
 _ROUGH = 1e-4
 """Error of the runs that differentiate the period map; less where friction is so dry that a step
 would err by more than a tenth of delta: bodies that should rest are then shaken to and fro."""
@@ -49,6 +76,275 @@ _USUAL = 0.125
 _MOST_STEPS = 30
 _OTHER = 1e-2  # momenta [body lengths per period] by which two motions differ that are not one
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
+_Breaks = np.ndarray | tuple[float, ...]
+
+
+def _through_periods(
+    run: Callable[[np.ndarray], Course], start: np.ndarray, periods: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Phases, states there, and states at the ends of periods ``(n_state, periods + 1)``."""
+    courses, ends = [], [start]
+    for _ in range(periods):
+        courses.append(run(ends[-1]))
+        ends.append(courses[-1].states[:, -1])
+    phases = np.concatenate([k + course.phases for k, course in enumerate(courses)])
+    states = np.concatenate([course.states for course in courses], axis=1)
+    return phases, states, np.stack(ends, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class SlopeMotion:
+    """A gait on a slope, period by period."""
+
+    grade: float  # tangent of the inclination
+    course: float
+    """Direction of the gait on the level, from that of the tail link at phase 0 [rad]."""
+    headings: np.ndarray
+    """Directions, at the ends of periods ``(n_period + 1,)``, in which the gait would go on from
+    there on the level, from straight uphill, positive to the left [rad]."""
+    climb: np.ndarray  # of the centre of mass up the fall line [body lengths], (n_period,)
+    aside: np.ndarray  # to the left of it
+    friction_work: np.ndarray  # [pressing force x body length]
+    joint_work: np.ndarray  # by the moments in the joints
+    steering: np.ndarray  # derivative of a period's last heading by its first, always positive
+    error: float
+    """Error of headings, ways and works at the end: their change where steps may err 30 times as
+    much."""
+    several: float
+    """Part of the time at which several motions are balanced. One of them is followed, and no error
+    says what the others would change."""
+    phases: np.ndarray  # where the solver stepped, counted from the first start, (n,)
+    states: np.ndarray
+    """Theta, way up and aside, work against friction and of the joints, logarithm of the steering,
+    all but theta from the first start, ``(6, n)``."""
+
+    def __repr__(self) -> str:
+        count = (
+            f"{self.climb.size} period{'s' * (self.climb.size > 1)} on a grade of {self.grade:g}"
+        )
+        ends = f"heading {self.headings[0]:.4f} -> {self.headings[-1]:.4f}"
+        return (
+            f"<SlopeMotion of {count}: climb {self.climb.sum():.6g}, work of the joints "
+            f"{self.joint_work.sum():.6g}, {ends}>"
+        )
+
+    @property
+    def turn(self) -> float:
+        """Turn of the heading over all periods [rad]."""
+        return float(self.headings[-1] - self.headings[0])
+
+    @property
+    def stable(self) -> bool:
+        """Whether headings beside this one come closer to it."""
+        return bool(np.prod(self.steering) < 1.0)
+
+
+class GaitOnSlope:
+    """A gait of a chain on a slope."""
+
+    def __init__(
+        self,
+        body: Body,
+        friction: Law,
+        path: Path,
+        delta: float,
+        grade: float,
+        breaks: _Breaks = (),
+    ) -> None:
+        self.body, self.slope = checked_chain(body, friction, grade), Regime(grade=float(grade))
+        self.friction, self.path, self.delta = friction, path, delta
+        self.breaks = tuple(sorted(map(float, breaks)))
+
+    def integrate(
+        self, begin: np.ndarray | float, tolerance: float, longest: float = np.inf
+    ) -> Course:
+        """`SlopeMotion.states` through a period, from the first of them at its begin."""
+
+        def rates(
+            t: float, state: np.ndarray, near: np.ndarray | None
+        ) -> tuple[np.ndarray, np.ndarray]:
+            at = self.body, self.friction, self.slope, (*self.path(np.array([t])), self.delta)
+            solved, now, _, by_theta = balance_on_slope(*at, state[:1], start=near)
+            if not solved.converged.all():
+                raise NotConvergedError(
+                    f"no balance at phase {t:.4f} on a slope of grade {self.slope.grade:g} "
+                    f"(residual {solved.residual[0]:.1e}): friction may be too weak to hold the "
+                    f"body in that direction, so that it slides down; try a gentler slope."
+                )
+            moved = np.exp(1j * state[0]) * complex(*now.centre[:, 0])
+            works = now.power[0], now.actuator_power[0]
+            (omega,), (steering,) = now.z[2], by_theta[2]
+            return np.array([omega, moved.real, moved.imag, *works, steering]), solved.z
+
+        start = np.append(begin, np.zeros(6 - np.size(begin)))
+        return integrate_period(rates, start, tolerance * _UNITS, self.breaks, longest)
+
+    def instants(self, phases: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
+        """Instants at phases and orientations ``(n,)``, and the residual of the balance."""
+        at = (self.body, self.friction, *self.path(phases), self.delta)
+        load = self.slope.pull(theta[None])
+        solved = solve_balance(*at, load=load)
+        return Instants(*at, z=solved.z, load=load), solved.residual
+
+    def totals(self, ran: Course, quantities: Sequence[Quantity], ends: np.ndarray) -> np.ndarray:
+        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the solver's
+        steps."""
+        if not quantities:
+            return np.empty((0, ends.size))
+        edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
+        h = np.diff(edges)
+        t = (edges[:-1, None] + h[:, None] * PANEL_RULE.c).ravel()
+        now, _ = self.instants(t, ran.at(t)[0])
+        parts = [h * (each.at(now)[0].reshape(h.size, -1) @ PANEL_RULE.b) for each in quantities]
+        sums = np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
+        return sums[:, np.searchsorted(edges, ends)]
+
+    def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
+        """Part of the time at which several motions are balanced."""
+        if self.friction.associated:
+            return 0.0
+        at = (self.body, self.friction, *self.path(phases % 1.0), self.delta)
+        several = all_balanced_velocities(*at, self.slope.pull(theta[None])).number > 1
+        return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
+
+
+def slope_motion(
+    body: Body,
+    friction: Law,
+    gait: Path,
+    delta: float,
+    grade: float,
+    *,
+    heading: float | None = None,
+    theta: float | None = None,
+    periods: int = 1,
+    tolerance: float = 1e-6,
+    breaks: _Breaks = (),
+) -> SlopeMotion:
+    """Follow a gait on a slope through periods, from a heading.
+
+    Parameters
+    ----------
+    body : Chain
+    friction : Law
+        Coefficients are in units of the force that presses the body on the slope, its weight times
+        the cosine of the inclination; so are all forces and works.
+    gait : callable
+        Joint angles and rates at phases in [0, 1]; any gait of colloc.
+    delta : float
+        Regularisation speed, per period. A body at rest creeps down at about delta x grade / mu.
+    grade : float
+        Tangent of the inclination, from 0.
+    heading : float, optional
+        At the start: the direction in which the gait would go on the level, from straight uphill,
+        positive to the left [rad]. Of a gait that goes nowhere on the level, the direction of its
+        tail link at phase 0. By default 0, or of a solution's gait for a slope its own.
+    theta : float, optional
+        The same by the direction of the tail link at phase 0 from straight uphill; instead of a
+        heading.
+    periods : int
+    tolerance : float
+        Of headings, ways and works over a period, about; what is left is stated
+        (`SlopeMotion.error`).
+    breaks : (n,), optional
+        Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
+
+    Raises
+    ------
+    ProblemError
+        For a body that is no chain, or a slope that is steeper than friction can hold.
+    NotConvergedError
+        If no balance is found at some instant: unequal coefficients may hold the body in one
+        direction and not in another.
+
+    Examples
+    --------
+    The most efficient gait of one harmonic is none for slopes:
+
+    >>> import colloc
+    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
+    >>> for grade in (0.0, 0.05, 0.1):
+    ...     ran = colloc.slope_motion(colloc.Chain(), colloc.Friction(), gait, delta=1e-4,
+    ...         grade=grade)
+    ...     print(ran.climb.round(3), ran.joint_work.round(3))
+    [0.268] [1.03]
+    [0.181] [1.041]
+    [0.091] [1.048]
+    """
+    on = GaitOnSlope(body, friction, gait, delta, grade, breaks)
+    if heading is None and theta is None:
+        theta = getattr(gait, "theta", None)
+    check_finite(heading=0.0 if heading is None else heading, theta=0.0 if theta is None else theta)
+    check_finite(positive=True, tolerance=tolerance)
+    check_count(MOST_PERIODS, periods=periods)
+    edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), on.breaks)
+    way = fine_motion(on.body, friction, gait, delta, edges, tolerance, None).path[-1]
+    course = float(np.angle(way)) if abs(way) > tolerance else 0.0
+    start = np.append((heading or 0.0) - course if theta is None else theta, np.zeros(5))
+    (_, loose, _), (phases, states, ends) = (
+        _through_periods(partial(on.integrate, tolerance=aim), start, periods)
+        for aim in (_LOOSER * tolerance, tolerance)
+    )
+    climb, aside, friction_work, joint_work, steering = np.diff(ends[1:])
+    error = float(np.abs(states[:5, -1] - loose[:5, -1]).max())
+    several = on.several(phases, states[0])
+    ways = climb, aside, friction_work, joint_work
+    return SlopeMotion(
+        on.slope.grade, course, ends[0] + course, *ways, np.exp(steering), error, several, phases,
+        states,
+    )  # fmt: skip
+
+
+def slope_replay(
+    body: Body,
+    friction: Law,
+    gait: Any,
+    delta: float,
+    *,
+    slope: Regime,
+    instants: int = 1600,
+    tolerance: float = 1e-6,
+    breaks: _Breaks = (),
+    objective: Objective = EFFICIENCY,
+    quantities: Iterable[Quantity | str] = (),
+    limits: Iterable[PathLimit] | PathLimits = (),
+    **_: object,
+) -> Replay:
+    """A period of a gait that says where it points, with the arguments of `colloc.replay`: the
+    distance is the way in the direction that counts, the work that of the joints."""
+    asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
+    with_forces = [each for each in asked if each.needs_forces]
+    totals = whole_totals([each for each in asked if not each.needs_forces], gait)
+    on = GaitOnSlope(body, friction, gait, delta, slope.grade, breaks)
+
+    def run(aim: float) -> tuple[tuple[Course, float], Numbers]:
+        ran = on.integrate(gait.theta, aim, _LONGEST / instants)
+        theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
+        way, work = slope.travel_along(complex(climb, aside)), float(spent + slope.grade * climb)
+        numbers = {"distance": way.real, "work": work, "rotation": float(theta)}
+        sums = on.totals(ran, with_forces, np.ones(1))[:, 0].tolist()
+        names = (each.name for each in with_forces)
+        return (ran, way.imag), numbers | dict(zip(names, sums, strict=True))
+
+    first = _FIRST * tolerance
+    (ran, across), values, errors = to_tolerance(run, first, objective, tolerance, totals)
+    limits, phases = limits_of(limits, body.n_joint), ran.phases % 1.0
+    now, residual = on.instants(phases, ran.states[0])
+    return Replay(
+        values=values,
+        errors=errors,
+        others={},
+        lever=lever(body, now.angles),
+        actuator_work=float(ran.states[4, -1]),
+        residual=float(residual.max()),
+        error=float(objective.relative_error(values, errors)),
+        several=on.several(ran.phases, ran.states[0]),
+        instants=phases.size,
+        tail=(phases, now.z),
+        shares=limits.sizes(limits.at(now)).max(axis=1) if limits.names else np.empty(0),
+        objective=objective,
+        across=across,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +405,7 @@ class GaitWithInertia:
         delta: float,
         *,
         froude: float,
-        breaks: np.ndarray | tuple[float, ...] = (),
+        breaks: _Breaks = (),
         turn: float = 0.0,
         regime: Regime = LEVEL,
     ) -> None:
@@ -130,33 +426,24 @@ class GaitWithInertia:
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 
     def run(self, start: np.ndarray, aim: float) -> Course:
-        """`InertialMotion.states` through a period from a state ``(7,)``, or momenta ``(3,)`` at
-        the origin."""
-        return self._run(np.append(start, [self.theta, 0.0, 0.0, 0.0][start.size - 3 :])[None], aim)
-
-    def _run(self, begin: np.ndarray, aim: float) -> Course:
-        """Several motions with the same steps, from states ``(n, 7)``."""
+        """`InertialMotion.states` through a period from a state ``(7,)``, momenta ``(3,)`` at the
+        origin, or several states ``(n, 7)``, with the same steps."""
+        if start.shape == (3,):
+            start = np.append(start, [self.theta, 0.0, 0.0, 0.0])
 
         def rates(t: float, states: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            return self._rates(t, states.reshape(begin.shape)).ravel(), None
+            states, (angles, rates) = states.reshape(-1, 7), self.path(np.array([t]))
+            at = angles[:, 0], rates[:, 0], states[:, _MOMENTA]
+            now = self._momenta_of(len(states))(*at)
+            if self.regime.slides:
+                pull: Any = self.regime.pull(states[None, :, _THETA])
+                now[:, -3:-1] += pull.T / self.froude
+            moved = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
+            place = moved.real, moved.imag
+            out = np.column_stack([now[:, 6:], now[:, 2] - self.turn, *place, now[:, 5]])
+            return out.ravel(), None
 
-        return integrate_period(rates, begin.ravel(), aim, self.breaks)
-
-    def _at(self, t: float, states: np.ndarray) -> np.ndarray:
-        """Outputs of `colloc.dynamics.chain`, with the weight's pull, ``(n, 9)``."""
-        angles, rates = self.path(np.array([t]))
-        now = self._momenta_of(len(states))(angles[:, 0], rates[:, 0], states[:, _MOMENTA])
-        if self.regime.slides:
-            pull: Any = self.regime.pull(states[None, :, _THETA])
-            now[:, -3:-1] += pull.T / self.froude
-        return now
-
-    def _rates(self, t: float, states: np.ndarray) -> np.ndarray:
-        now, rates = self._at(t, states), np.empty(states.shape)
-        moved = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
-        rates[:, _MOMENTA], rates[:, _THETA] = now[:, 6:], now[:, 2] - self.turn
-        rates[:, 4], rates[:, 5], rates[:, _WORK] = moved.real, moved.imag, now[:, 5]
-        return rates
+        return integrate_period(rates, start.ravel(), aim, self.breaks)
 
     def totals(self, states: np.ndarray) -> Numbers:
         """Distance, work of the joints and rotation from the first of states ``(7, n)`` to the
@@ -175,7 +462,7 @@ class GaitWithInertia:
         begin = np.zeros((4, 7))
         begin[:, _MOMENTA] = start + np.vstack([np.zeros(3), _APART * np.eye(3)])
         begin[:, _THETA] = self.theta
-        end = self._run(begin, self._rough).states[:, -1].reshape(begin.shape)
+        end = self.run(begin, self._rough).states[:, -1].reshape(begin.shape)
         return np.stack([begin[0], end[0]], axis=1), (end[1:] - end[0]).T / _APART
 
     def rough_period(self, near: np.ndarray) -> RoughPeriod:
@@ -187,10 +474,7 @@ class GaitWithInertia:
             start = start + step
             if np.abs(step).max() < _LEFT_OPEN * self._rough:
                 return RoughPeriod(start, ends, slopes)
-        raise NotConvergedError(
-            f"at a Froude number of {self.froude:g} no motion was found in which all periods are "
-            f"alike; try a smaller one."
-        )
+        raise self._not_alike()
 
     def find_period(self, near: np.ndarray | None = None) -> RoughPeriod:
         """`rough_period` near some momenta; else near the quasi-static ones, or none: a body that
@@ -213,9 +497,12 @@ class GaitWithInertia:
             if size < aim or (before <= size and np.abs(gap).max() < _LEFT_OPEN * aim):
                 return PeriodicRun(course, start, aim)
             before = size
-        raise NotConvergedError(
-            f"at a Froude number of {self.froude:g} the periods do not become alike; try a "
-            f"smaller one."
+        raise self._not_alike()
+
+    def _not_alike(self) -> NotConvergedError:
+        return NotConvergedError(
+            f"at a Froude number of {self.froude:g} no motion was found in which all periods are "
+            f"alike; try a smaller one."
         )
 
     def errors(self, ran: PeriodicRun, before: PeriodicRun, slopes: np.ndarray) -> Numbers:
@@ -261,7 +548,7 @@ def inertial_motion(
     froude: float,
     *,
     tolerance: float = 1e-5,
-    breaks: np.ndarray | tuple[float, ...] = (),
+    breaks: _Breaks = (),
     objective: Objective = EFFICIENCY,
     turn: float = 0.0,
     quantities: Iterable[Quantity | str] = (),
@@ -351,7 +638,7 @@ def inertial_replay(
     *,
     regime: Regime,
     tolerance: float = 1e-6,
-    breaks: np.ndarray | tuple[float, ...] = (),
+    breaks: _Breaks = (),
     objective: Objective = EFFICIENCY,
     turn: float = 0.0,
     quantities: Iterable[Quantity | str] = (),
@@ -392,7 +679,7 @@ def inertial_replay(
         values=ran.values,
         errors=ran.errors,
         others={name: abs(there[name] - here[name]) for name in here},
-        lever=float(lever(chain, angles).max()),
+        lever=lever(chain, angles),
         actuator_work=ran.work + float(energy[-1] - energy[0]),
         residual=float(np.abs(change[_MOMENTA]).max()),
         error=ran.error_of(objective),
@@ -423,7 +710,7 @@ def motion_from_rest(
     *,
     periods: int = 3,
     tolerance: float = 1e-5,
-    breaks: np.ndarray | tuple[float, ...] = (),
+    breaks: _Breaks = (),
     grade: float = 0.0,
     theta: float = 0.0,
 ) -> FromRest:
@@ -468,7 +755,7 @@ def motion_from_rest(
     how: Any = {"froude": froude, "breaks": breaks}
     moving = GaitWithInertia(body, friction, gait, delta, regime=Regime(grade=float(grade)), **how)
     start = np.array([0.0, 0.0, 0.0, theta, 0.0, 0.0, 0.0])
-    phases, states, ends = through_periods(partial(moving.run, aim=tolerance), start, periods)
+    phases, states, ends = _through_periods(partial(moving.run, aim=tolerance), start, periods)
     change = np.diff(ends)
     totals = [np.hypot(*change[_PLACE]), change[_WORK], change[_THETA]]
     return FromRest(phases, states, np.array(totals).T)
