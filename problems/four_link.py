@@ -5,7 +5,7 @@
     angle 3 = -a0 - a1 cos(2 pi t) + b1 sin(2 pi t)
 
 Maximise d/W. Links 1 and 4 are kept from crossing once a gait is found in which they do
-(`search.converge`). There are many local optima (0.160 from a guess that waves both ends up); from
+(`search.optimise`). There are many local optima (0.160 from a guess that waves both ends up); from
 this guess, one of six random starts, the best one known.
 """
 

@@ -82,8 +82,8 @@ def unsolved():
 def guess_in_balance(problem):
     from colloc.results.answer import Answer
     from colloc.results.solution import Solution
-    from colloc.search.spaces import program_of
     from colloc.verification.replay import replay
+    from tests.shared.stages import program_of
 
     program = program_of(problem)
     parameters = program.control.admissible.parameters(problem.guess)

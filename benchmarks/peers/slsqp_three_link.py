@@ -15,7 +15,7 @@ from benchmarks.peers.runs import arguments, failed, found, run
 from benchmarks.peers.settings import INTERVALS
 from colloc import Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
-from colloc.search.spaces import space_near
+from colloc.search.iterate import space_near
 from colloc.transcription.layout import RADIANS
 
 TOLERANCE = 1e-9

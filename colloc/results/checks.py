@@ -34,43 +34,24 @@ class Check:
 @dataclass(frozen=True)
 class Certificate(Period):
     """The verdict of an independent replay, with the quantities of the period at the solution's
-    delta.
+    delta, and extrapolated to delta = 0 with the gait held fixed.
 
-    Errors are those of distance and work; they hold for every balanced motion, and for every point
-    of the body that could be followed, so that `others` is empty.
-
-    Attributes
-    ----------
-    checks : tuple of Check
-    instants : int
-        Instants of the replay in one period; 0 if there was none (see `UNCERTIFIED`).
-    efficiency_error : float
-        Error of that efficiency: what refining the replay changes, and what following another point
-        of the body would (net rotation times the body's reach over the distance), and what the
-        body's other balanced motions would, if any.
-    efficiency_at_zero_delta, error_at_zero_delta : float
-        Extrapolation of the replayed efficiency to delta = 0, with the gait held fixed, and its
-        error (`colloc.results.measured.extrapolated_limit`).
-    value, value_error, value_at_zero_delta, value_error_at_zero_delta : float
-        The same of the problem's objective.
-    dry : (float, float), optional
-        Between what the efficiency lies under dry friction, with no delta
-        (`colloc.verification.dry_friction`), if that was asked for.
-    of_samples : tuple of float, optional
-        What the errors of value, efficiency, distance and work hold for what the samples of a gait
-        are off by.
+    Errors hold what refining the replay changes, what following another point of the body would
+    (net rotation times the body's reach over the distance), and what the body's other balanced
+    motions would, so that `others` is empty.
     """
 
     checks: tuple[Check, ...]
-    instants: int
+    instants: int  # of the replay in one period; 0 if there was none (see `UNCERTIFIED`)
     efficiency_error: float
     efficiency_at_zero_delta: float
     error_at_zero_delta: float
-    value: float
+    value: float  # of the problem's objective
     value_error: float
     value_at_zero_delta: float
     value_error_at_zero_delta: float
-    dry: tuple[float, float] | None = None
+    dry: tuple[float, float] | None = None  # bounds of the efficiency without any delta, if asked
+    # parts of the errors of value, efficiency, distance and work due to samples of a gait
     of_samples: tuple[float, ...] | None = None
 
     def __repr__(self) -> str:

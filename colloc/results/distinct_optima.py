@@ -29,12 +29,9 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 
-_GRID = 64
-_NEWTON_STEPS = 6
 SAME_VALUE, SAME_GAIT = 1e-3, 0.05
 """Relative difference of values and root-mean-square distance [rad] of gaits that are one; the
 objective is flat at its maximum, so the path is the laxer."""
-SERIES_HARMONICS = 16
 
 
 def reversed_in_time(gait: Fourier) -> Fourier:
@@ -67,9 +64,9 @@ def phase_distance(a: Fourier, b: Fourier) -> float:
     k = np.arange(1, n + 1)
     # sum over joints of conj(a_k) b_k: shifting b by phase x multiplies it by exp(i k x)
     overlap = np.sum((a.cos + 1j * a.sin) * (b.cos - 1j * b.sin), axis=0)
-    x = 2 * np.pi * np.arange(_GRID * n) / (_GRID * n)
+    x = 2 * np.pi * np.arange(64 * n) / (64 * n)
     x = x[np.argmax((np.exp(1j * np.outer(x, k)) @ overlap).real)]
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(6):
         wave = overlap * np.exp(1j * k * x)
         slope, curvature = float((1j * k * wave).real.sum()), float(-(k**2 * wave).real.sum())
         if curvature >= 0:
@@ -93,7 +90,7 @@ def are_one(a: tuple[float, Fourier], b: tuple[float, Fourier], body: Body, fric
 
 
 def series_class(problem: Problem) -> Harmonic:
-    return problem.gait.series(SERIES_HARMONICS)
+    return problem.gait.series(16)
 
 
 def fourier_series(problem: Problem, gait: AnyGait) -> Fourier:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +16,9 @@ from colloc.dynamics.slow_enough import slow_enough
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.mechanics.bodies import Sliding
 from colloc.mechanics.inertia import checked_mass, tail_velocity
-from colloc.numerics.mesh import Mesh
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
 from colloc.results.checks import UNCERTIFIED, Certificate
-from colloc.results.collocated_motion import CollocatedMotion
 from colloc.results.motion import (
     PHASES,
     SAMPLES,
@@ -38,7 +36,6 @@ from colloc.results.motion import (
 from colloc.system.arguments import checked_arguments
 from colloc.system.environment import higher, versions
 from colloc.system.errors import ProblemError
-from colloc.transcription.layout import Layout
 from colloc.verification.dry_friction import DryFriction, dry_friction
 from colloc.verification.replay import replayer
 
@@ -50,9 +47,7 @@ SOLVED = "solved"
 NOT_CONVERGED = "not converged"
 CERTIFICATE_FAILED = "certificate failed"
 INTERRUPTED = "interrupted"
-_HOLDS, _INSTANTS = 3.0, np.arange(2000) / 2000
-"""Speed of a foot over delta below which it sticks; phases to count at."""
-_MOST_OTHERS = 4
+_INSTANTS = np.arange(2000) / 2000  # to count at
 
 
 @dataclass(eq=False)
@@ -61,7 +56,6 @@ class Solution:
 
     Attributes
     ----------
-    problem : Problem
     answer : Answer
         The gait, as a point of the full program of direct collocation.
     certificate : Certificate
@@ -72,7 +66,6 @@ class Solution:
         Text of the problem file, if there was one.
     message : str
         What went wrong and what to try, if something did.
-    versions : dict
     starts : int
         How many the gait is the best of.
     others : tuple of Alternative
@@ -81,6 +74,8 @@ class Solution:
         A better gait that is so small that nobody sees it move; saved by itself.
     interrupted : bool
         Whether the search ended early, by Ctrl-C or because its time was over.
+    settings : dict
+        Tolerances and options of the search (`colloc.search.options`).
 
     Examples
     --------
@@ -100,20 +95,20 @@ class Solution:
     seconds: float = 0.0
     source: str = ""
     message: str = ""
-    versions: dict[str, str] = field(default_factory=lambda: versions())
+    versions: dict[str, str] = field(default_factory=versions)
     starts: int = 1
     others: tuple[Alternative, ...] = ()
     shrunk: Solution | None = None
     interrupted: bool = False
+    settings: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        replayed = "" if self.certificate.replayed else " (not replayed)"
-        error = f" +- {self.certificate.value_error:.0e}" if self.certificate.replayed else ""
-        number = f"{self.problem.objective.short} = {self.value:.6g}{error}{replayed}"
-        return (
-            f"<Solution {self.problem.name}, {self.status}, {number} at delta = "
-            f"{self.answer.delta:.1e}>"
-        )
+        error = " (not replayed)"
+        if self.certificate.replayed:
+            error = f" +- {self.certificate.value_error:.0e}"
+        number = f"{self.problem.objective.short} = {self.value:.6g}{error}"
+        at = f"delta = {self.answer.delta:.1e}"
+        return f"<Solution {self.problem.name}, {self.status}, {number} at {at}>"
 
     @property
     def status(self) -> str:
@@ -140,25 +135,25 @@ class Solution:
         """Certificate if there was a replay, else the answer."""
         return self.certificate if self.certificate.replayed else self.answer
 
-    @property
-    def value(self) -> float:
-        """Value of the objective, by replay if there was one."""
-        return self.measured.value
-
-    @property
-    def efficiency(self) -> float:
-        """Distance over work, by replay if there was one."""
-        return self.measured.efficiency
-
-    @property
-    def distance(self) -> float:
-        """Displacement over a period, by replay if there was one."""
-        return self.measured.distance
-
-    @property
-    def work(self) -> float:
-        """Work over a period, by replay if there was one."""
-        return self.measured.work
+    value = property(
+        attrgetter("measured.value"), doc="Value of the objective, by replay if there was one."
+    )
+    efficiency = property(
+        attrgetter("measured.efficiency"), doc="Distance over work, by replay if there was one."
+    )
+    distance = property(
+        attrgetter("measured.distance"),
+        doc="Displacement over a period, by replay if there was one.",
+    )
+    work = property(
+        attrgetter("measured.work"), doc="Work over a period, by replay if there was one."
+    )
+    mesh = property(attrgetter("answer.mesh"), doc="Mesh of the collocation, in phases.")
+    motion = property(attrgetter("answer.motion"), doc="The motion, as collocated.")
+    delta_per_period = property(
+        attrgetter("answer.delta_per_period"),
+        doc="Regularisation speed [body lengths per period].",
+    )
 
     @property
     def rotation(self) -> float:
@@ -192,21 +187,15 @@ class Solution:
     def played_slowly(self) -> float:
         """The objective of the same gait played so slowly that inertia does not matter;
         `NotConvergedError` if a slope does not hold it then."""
-        p, at = self.problem, self.answer.delta_per_period
-        asked: Any = {
-            "quantities": p.objective.integrals,
-            "turn": p.rotation or 0.0,
-            "breaks": self.gait.corner_phases,
-        }
-        period = {"period": self.froude**-0.5} if self.froude else {}
-        return float(
-            p.objective(
-                {
-                    **replayer(p.regime.slowly)(p.body, p.law, self.gait, at, **asked).values,
-                    **period,
-                }
-            )
+        p = self.problem
+        replay = replayer(p.regime.slowly)(
+            *(p.body, p.law, self.gait, self.delta_per_period),
+            quantities=p.objective.integrals,
+            turn=p.rotation or 0.0,
+            breaks=self.gait.corner_phases,
         )
+        period = {"period": self.froude**-0.5} if self.froude else {}
+        return float(p.objective({**replay.values, **period}))
 
     def slow_enough(self, loss: float = 0.01) -> float:
         """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than
@@ -218,7 +207,7 @@ class Solution:
         """
         if self.problem.regime.slides:
             raise ProblemError("on a slope it is not known how slow is slow enough.")
-        at = self.problem.body, self.problem.law, self.gait, self.answer.delta_per_period
+        at = self.problem.body, self.problem.law, self.gait, self.delta_per_period
         return slow_enough(*at, loss, breaks=self.gait.corner_phases)
 
     def dry(self) -> DryFriction:
@@ -230,22 +219,12 @@ class Solution:
         ProblemError
             Unless a chain crawls slowly on the level, under a law whose dry balance minimises the
             dissipation: isotropic friction or `Elliptic`.
-
-        Examples
-        --------
-        >>> import colloc
-        >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-        >>> solution = colloc.solve(problem, starts=1)
-        >>> least, most = solution.dry().efficiency
-        >>> most - least < 1e-4
-        True
         """
         p = self.problem
         if not p.regime.slow_on_level:
             raise ProblemError("bounds for dry friction are there for slow gaits on the level.")
-        return dry_friction(
-            p.body, p.law, self.gait, breaks=self.gait.corner_phases, turn=p.rotation or 0.0
-        )
+        how: Any = {"breaks": self.gait.corner_phases, "turn": p.rotation or 0.0}
+        return dry_friction(p.body, p.law, self.gait, **how)
 
     def certify_dry(self) -> None:
         """Put the efficiency under dry friction into the certificate, which is saved with it;
@@ -262,37 +241,13 @@ class Solution:
             return ["local optimum, from one start"]
         # others are as a coarse mesh sees them, and one that shrank may be better
         this = min(self.others, key=lambda other: abs(other.value - self.answer.value))
-        others = [other for other in self.others if other is not this]
-        lines = [f"local optimum, best of {self.starts} starts, {this.starts} of which met it"]
-        if others:
-            lines.append(
-                "also met, on a coarse mesh: " + "; ".join(map(str, others[:_MOST_OTHERS]))
-            )
-        return lines
-
-    @property
-    def mesh(self) -> Mesh:
-        return self.answer.mesh
-
-    @property
-    def layout(self) -> Layout:
-        return self.answer.layout
+        others = "; ".join([str(other) for other in self.others if other is not this][:4])
+        first = f"local optimum, best of {self.starts} starts, {this.starts} of which met it"
+        return [first, f"also met, on a coarse mesh: {others}"] if others else [first]
 
     @property
     def gait(self) -> AnyGait:
         return self.answer.gait.with_coordinate(self.problem.body.defaults.coordinate)
-
-    @property
-    def delta_per_period(self) -> float:
-        """Regularisation speed [body lengths per period]."""
-        return self.answer.delta_per_period
-
-    @property
-    def motion(self) -> CollocatedMotion:
-        return self.answer.motion
-
-    def at_points(self) -> tuple[np.ndarray, Sliding]:
-        return self.mesh.times, self.motion.at_points
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
         """The motion at phases t, any real numbers, period after period:
@@ -314,9 +269,7 @@ class Solution:
             If the problem states no pace: without inertia the first period is like all others.
         """
         # loads what integrates, which few need
-        from colloc.verification.differential_motion import (
-            motion_from_rest,
-        )
+        from colloc.verification.differential_motion import motion_from_rest
 
         p, chain = self.problem, self.problem.body
         if not p.froude:
@@ -324,25 +277,18 @@ class Solution:
                 f"{p.name} has no inertia, and is under way at once: from rest is for problems "
                 f"with a froude."
             )
-        played = p.law, self.gait, self.delta_per_period, self.froude
-        begun: Any = {
-            "grade": p.grade,
-            "theta": getattr(self.gait, "theta", None) or 0.0,
-            "breaks": self.gait.corner_phases,
-        }
-        ran = motion_from_rest(chain, *played, periods=max(1, int(np.ceil(t[-1]))), **begun)
+        ran = motion_from_rest(
+            *(chain, p.law, self.gait, self.delta_per_period, self.froude),
+            periods=max(1, int(np.ceil(t[-1]))),
+            grade=p.grade,
+            theta=getattr(self.gait, "theta", None) or 0.0,
+            breaks=self.gait.corner_phases,
+        )
         states = np.array([np.interp(t, ran.phases, row) for row in ran.states])
         (angles, rates), theta, centre = self.gait(t % 1.0), states[3], states[4:6]
         z = tail_velocity(checked_mass(chain), angles, rates, states[:3])
-        return SampledMotion(
-            t,
-            angles,
-            rates,
-            z,
-            theta,
-            centre,
-            centre - rotate(np.array(chain.centre(angles)), theta),
-        )
+        tail = centre - rotate(np.array(chain.centre(angles)), theta)
+        return SampledMotion(t, angles, rates, z, theta, centre, tail)
 
     def holding(self, motion: SampledMotion) -> np.ndarray:
         """Sticking feet, slower than 3 delta, ``(n_foot, n_time)``; no rows without feet."""
@@ -350,7 +296,7 @@ class Solution:
         if not foot_kinds(body):
             return np.zeros((0, motion.t.size), dtype=bool)
         speeds = part_speeds(body, motion)[1]
-        return speeds < _HOLDS * self.delta_per_period
+        return np.asarray(speeds < 3.0 * self.delta_per_period)
 
     @property
     def share_held(self) -> np.ndarray:
@@ -404,14 +350,6 @@ class Solution:
         many metres and kilograms.
 
         Options as there: `gravity`, `max_speed`, `max_torque`.
-
-        Examples
-        --------
-        >>> import colloc
-        >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-        >>> robot = colloc.solve(problem, starts=1).robot(length=1.2, mass=3, period=5)
-        >>> round(robot.facts["cost_of_transport"], 2)
-        3.95
         """
         return higher("results.robot:Robot")(self, length, mass, period, **options)
 
@@ -422,27 +360,16 @@ class Solution:
 
         With `resolve` also what the best gait gets where each is a tenth smaller and larger, and
         what this one gets there.
-
-        Examples
-        --------
-        >>> import colloc
-        >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-        >>> round(colloc.solve(problem, starts=1).sensitivity()["friction sideways"].slope, 3)
-        -0.061
         """
         return higher("search.sensitivity:sensitivity")(self, resolve)
 
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
         """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a
         result file's group motion."""
-        about = {
-            "name": self.problem.name,
-            "status": self.status,
-            "efficiency": self.measured.efficiency,
-        }
-        about |= {"rotation": self.rotation, "turning_radius": self.turning_radius}
+        names = ("status", "efficiency", "rotation", "turning_radius")
+        about = {"name": self.problem.name} | {name: getattr(self, name) for name in names}
         if self.problem.objective != EFFICIENCY:
-            about |= {"objective": self.problem.objective.name, "value": self.measured.value}
+            about |= {"objective": self.problem.objective.name, "value": self.value}
         return motion_dataset(self.columns(t), about)
 
     def to_dataframe(self, t: np.ndarray | None = None) -> pandas.DataFrame:

@@ -1,6 +1,6 @@
 """Solutions as HDF5 files, readable with plain h5py; every dataset has ``units`` and ``dims``.
 
-/problem (JSON), /source (problem file), /versions (JSON), /others (JSON)
+/problem (JSON), /source (problem file), /versions, /settings, /others (JSON)
 /gait/{mean,cos,sin} or {corners}, with attribute symmetry, ...
 /motion/{t,joint_angles,joint_rates,tail_velocity,theta,centre,tail,power}: one period
 /answer/{edges,x,lam_x,lam_g}; attributes delta, value, distance, work, kkt_error, panels, ...
@@ -114,6 +114,7 @@ def load(path: str | os.PathLike[str]) -> Solution:
         solution.others = tuple(Alternative(**x | {"gait": gait_from(x["gait"])}) for x in others)
         solution.starts = int(attribute(file, "starts"))
         solution.interrupted = bool(attribute(file, "interrupted"))
+        solution.settings = json.loads(array(file, "settings")) if "settings" in file else {}
         return solution
 
 
@@ -143,6 +144,7 @@ def _write(file: h5py.File, solution: Solution) -> None:
     put(file, "problem", json.dumps(problem.to_dict()))
     put(file, "source", solution.source)
     put(file, "versions", json.dumps(solution.versions))
+    put(file, "settings", json.dumps(solution.settings))
     others = [{**dataclasses.asdict(x), "gait": fields(x.gait)} for x in solution.others]
     put(file, "others", json.dumps(others))
 

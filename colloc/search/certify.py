@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 
 from colloc.dynamics.control_problem import control_problem
@@ -17,7 +19,7 @@ from colloc.verification.adaptive_motion import Path, Replay
 from colloc.verification.mesh_error import mesh_error
 from colloc.verification.replay import replayer
 
-_FINE_PHASES = 20000
+Row = tuple[str, float, float, str]  # of a `Check`
 
 
 def is_trivial(answer: Answer) -> bool:
@@ -62,22 +64,47 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
     >>> colloc.certify(colloc.solve(problem, starts=1).answer, tolerance=1e-7).passed
     True
     """
-    problem, gait = answer.problem, answer.gait
+    problem, gait, at = answer.problem, answer.gait, TOLERANCES
     if instants is None:
         usual = problem.body.defaults
         each = 0.5 * usual.instants_a_point / problem.fraction
         instants = max(usual.instants, 2 * int(np.ceil(each * answer.mesh.n_point)))
-    is_optimum = answer.program != EVALUATED
+    before, after, speed = list[Row](), list[Row](), answer.delta_per_period
+    if answer.program != EVALUATED:
+        residual = float(np.abs(answer.motion.at_points.force).max() / problem.law.largest)
+        gradient, second = max(answer.kkt_error, answer.complementarity), answer.second_order
+        before = [
+            ("KKT error", gradient, at.kkt, "gradient of the Lagrangian, complementarity"),
+            (
+                *("constraint violation", answer.violation, at.violation),
+                "largest violated equation or bound",
+            ),
+            ("balance at nodes", residual, at.kkt, "net force and torque by the closed-form law"),
+        ]
+        value = max(-second.smallest - second.error, 0.0)
+        curvature = f"smallest curvature {second.smallest:.1e}"
+        directions = f"in {second.n_free} free directions"
+        if second.why_not:
+            value, verdict = 0.0, second.why_not
+        elif second.n_free == 0:
+            verdict = "a vertex: what binds leaves no direction free [1/rad^2]"
+        elif second.smallest > second.error:
+            verdict = f"an optimum: {curvature} {directions} [1/rad^2]"
+        elif value > at.saddle:
+            verdict = f"a saddle: {curvature} {directions} [1/rad^2]"
+        else:
+            verdict = f"flat: {curvature} +- {second.error:.0e} {directions} [1/rad^2]"
+        before.append(("second order", value, at.saddle, verdict))
+    if problem.mesh_tolerance > 0:
+        control, allowed = control_problem(problem), problem.mesh_tolerance
+        error = mesh_error(control, answer.mesh, gait, speed, allowed).estimate
+        meaning = f"of the {problem.objective.name}, relative, from defects between nodes"
+        after = [("mesh error", error, allowed, meaning)]
     return gait_certificate(
-        problem,
-        gait,
-        answer.delta_per_period,
-        gait.corner_phases,
-        instants,
-        tolerance,
+        *(problem, gait, speed, gait.corner_phases, instants, tolerance),
         claimed=answer.value,
-        before=(*_first_order(answer), _second_order(answer)) if is_optimum else (),
-        after=_mesh_error(answer),
+        before=before,
+        after=after,
     )
 
 
@@ -90,33 +117,14 @@ def gait_certificate(
     tolerance: float = 1e-6,
     *,
     claimed: float | None = None,
-    before: tuple[Check, ...] = (),
-    after: tuple[Check, ...] = (),
+    before: Iterable[Row] = (),
+    after: Iterable[Row] = (),
 ) -> Certificate:
-    """The certificate of any gait, by its replay at three deltas.
-
-    Parameters
-    ----------
-    problem : Problem
-        Body, friction and limits.
-    path : callable
-        Angles and rates of the gait (`colloc.verification.replay`).
-    delta : float
-        Per period.
-    breaks : (n,)
-        Phases where the rates jump.
-    instants, tolerance
-        Of the replay, see `certify`.
-    claimed : float, optional
-        A value of the problem's objective that the replay has to confirm.
-    before, after : tuple of Check
-        Further checks.
-    """
+    """The certificate of any gait, by its replay at three deltas, with further checks before and
+    after: of a path of angles and rates, whose rates jump at phases `breaks`, and of a `claimed`
+    value of the objective."""
     result = measured(
-        problem.body,
-        problem.law,
-        path,
-        delta,
+        *(problem.body, problem.law, path, delta),
         tolerance=tolerance,
         instants=instants,
         breaks=breaks,
@@ -127,24 +135,14 @@ def gait_certificate(
         objective=problem.objective,
     )
     fine, efficiency, value = result.fine, result.efficiency, result.value
-    influence = Check(
-        "delta influence",
-        value.limit.value / fine.value - 1,
-        problem.body.defaults.delta_influence,
-        "same gait at delta -> 0, relative change",
-    )
+    rows = [*before, *_rows(problem, path, fine, breaks, tolerance, claimed), *after]
+    influence = value.limit.value / fine.value - 1, problem.body.defaults.delta_influence
+    rows.append(("delta influence", *influence, "same gait at delta -> 0, relative change"))
     return Certificate(
         values=fine.values,
         errors=result.errors,
         others={},
-        checks=(
-            *before,
-            *_motion(problem, path, fine, breaks, tolerance, claimed),
-            *_requirements(problem, fine),
-            _one_motion(problem, fine),
-            *after,
-            influence,
-        ),
+        checks=tuple(Check(*row) for row in rows),
         instants=fine.instants,
         efficiency_error=efficiency.error,
         efficiency_at_zero_delta=efficiency.limit.value,
@@ -156,194 +154,86 @@ def gait_certificate(
     )
 
 
-def _first_order(answer: Answer) -> tuple[Check, ...]:
-    residual = np.abs(answer.motion.at_points.force).max() / answer.problem.law.largest
-    return (
-        Check(
-            "KKT error",
-            max(answer.kkt_error, answer.complementarity),
-            TOLERANCES.kkt,
-            "gradient of the Lagrangian, complementarity",
-        ),
-        Check(
-            "constraint violation",
-            answer.violation,
-            TOLERANCES.violation,
-            "largest violated equation or bound",
-        ),
-        Check(
-            "balance at nodes",
-            float(residual),
-            TOLERANCES.kkt,
-            "net force and torque by the closed-form law",
-        ),
-    )
-
-
-def _second_order(answer: Answer) -> Check:
-    second = answer.second_order
-    if second.why_not:
-        return Check("second order", 0.0, TOLERANCES.saddle, second.why_not)
-    value = max(-second.smallest - second.error, 0.0)
-    curvature = f"smallest curvature {second.smallest:.1e}"
-    directions = f"in {second.n_free} free directions"
-    if second.n_free == 0:
-        verdict = "a vertex: what binds leaves no direction free"
-    elif second.smallest > second.error:
-        verdict = f"an optimum: {curvature} {directions}"
-    elif value > TOLERANCES.saddle:
-        verdict = f"a saddle: {curvature} {directions}"
-    else:
-        verdict = f"flat: {curvature} +- {second.error:.0e} {directions}"
-    return Check("second order", value, TOLERANCES.saddle, f"{verdict} [1/rad^2]")
-
-
-def _motion(
+def _rows(
     problem: Problem,
     path: Path,
     fine: Replay,
     breaks: np.ndarray,
     tolerance: float,
     claimed: float | None,
-) -> list[Check]:
-    body, ends = problem.body, path(np.array([0.0, 1.0]))[0]
-    angles, rates = path(np.union1d(np.linspace(0.0, 1.0, _FINE_PHASES + 1), breaks))
-    stretched, limit = under_one_limit(angles, problem.joint_limit)
-    excess = max(float(body.bounded_angles.largest(stretched).max()) - limit, 0.0)
-    depth = max(float(crossing_depth(body, angles).max()), passing_depth(body, angles))
+) -> Iterator[Row]:
+    """Checks of the replayed motion, in their order."""
+    body, at, usual = problem.body, TOLERANCES, problem.body.defaults
+    ends = path(np.array([0.0, 1.0]))[0]
+    angles, rates = path(np.union1d(np.linspace(0.0, 1.0, 20001), breaks))
     balanced = "net force and torque at all replayed instants"
     if problem.froude:
         balanced = "what a period changes of the momenta"
-    checks = [
-        Check("balance in replay", fine.residual, TOLERANCES.kkt, balanced),
-        Check(
-            "closure",
-            float(np.abs(ends[:, 1] - ends[:, 0]).max()),
-            TOLERANCES.closure,
-            f"{body.defaults.quantity}s after one period [rad]",
-        ),
-        *_rotation(problem, fine),
-        Check(body.defaults.limit_name, excess, body.defaults.excess, "excess between nodes [rad]"),
-        Check(
-            "self-contact",
-            depth,
-            TOLERANCES.kkt,
-            "penetration of links between nodes [body lengths]",
-        ),
-        *_speeds(problem, rates),
-    ]
+    yield "balance in replay", fine.residual, at.kkt, balanced
+    opened, meaning = float(np.abs(ends[:, 1] - ends[:, 0]).max()), "s after one period [rad]"
+    yield "closure", opened, at.closure, f"{usual.quantity}{meaning}"
+    if problem.rotation is not None:
+        which = f"beyond {problem.rotation:g} rad" if problem.rotation else "over a period"
+        meaning = f"{which}, times the body's reach over the distance"
+        turned = astray(fine, problem.rotation) / max(fine.distance, 1e-300)
+        yield "net rotation", turned, at.replay_gap, meaning
+    stretched, limit = under_one_limit(angles, problem.joint_limit)
+    excess = max(float(body.bounded_angles.largest(stretched).max()) - limit, 0.0)
+    yield usual.limit_name, excess, usual.excess, "excess between nodes [rad]"
+    depth = max(float(crossing_depth(body, angles).max()), passing_depth(body, angles))
+    yield "self-contact", depth, at.kkt, "penetration of links between nodes [body lengths]"
+    if problem.largest_speeds:
+        joints = problem.joint_map
+        motors = rates if joints is None else joints.motor_rates(rates)
+        share = np.abs(motors).max(axis=1) / np.array(problem.largest_speeds)
+        name = f"{'motor' if joints else usual.coordinate} {int(share.argmax()) + 1}"
+        meaning = f"excess over a limit, relative; nearest to its own: {name}"
+        yield "joint speed", max(float(share.max()) - 1.0, 0.0), at.replay_gap, meaning
     lean = float(body.imbalance(angles).max()) if isinstance(body, Chain) else 0.0
     if lean > BALANCED:
-        meaning = (
-            "way from the centre of mass to where its weights press [body lengths]; "
-            "reported, not judged"
-        )
-        checks.append(Check("statics", lean, 1.0, meaning))  # the body is no longer than that
+        meaning = "way from the centre of mass to where its weights press [body lengths]; "
+        # the body is no longer than that
+        yield "statics", lean, 1.0, f"{meaning}reported, not judged"
     if fine.multipliers:
-        meaning = (
-            "largest Floquet multiplier: what a period leaves of a small change of the momenta"
-        )
-        checks.append(Check("stability", float(np.abs(fine.multipliers).max()), 1.0, meaning))
+        meaning = "largest Floquet multiplier: "
+        meaning += "what a period leaves of a small change of the momenta"
+        yield "stability", float(np.abs(fine.multipliers).max()), 1.0, meaning
     if claimed is not None:
         gap = claimed / fine.value - 1
         # the part that the motions that differ do not explain
         unexplained = float(np.copysign(max(abs(gap) - fine.ambiguity, 0.0), gap))
         meaning = "collocated over replayed efficiency, less 1"
-        checks.append(Check("replay gap", unexplained, TOLERANCES.replay_gap, meaning))
-    return [
-        *checks,
-        Check(
-            "replay error",
-            fine.error,
-            tolerance,
-            "relative: its quadrature and balance; allowed as asked for",
-        ),
-        Check(
-            "work = dissipation",
-            fine.actuator_work / fine.work - 1,
-            TOLERANCES.work_balance,
-            f"work of the joints over {problem.regime.spent}, less 1",
-        ),
-    ]
-
-
-def _rotation(problem: Problem, fine: Replay) -> list[Check]:
-    if problem.rotation is None:
-        return []
-    which = f"beyond {problem.rotation:g} rad" if problem.rotation else "over a period"
-    meaning = f"{which}, times the body's reach over the distance"
-    value = astray(fine, problem.rotation) / max(fine.distance, 1e-300)
-    return [Check("net rotation", value, TOLERANCES.replay_gap, meaning)]
-
-
-def _speeds(problem: Problem, rates: np.ndarray) -> list[Check]:
-    if not problem.largest_speeds:
-        return []
-    joints = problem.joint_map
-    motors = rates if joints is None else joints.motor_rates(rates)
-    share = np.abs(motors).max(axis=1) / np.array(problem.largest_speeds)
-    name = f"{'motor' if joints else problem.body.defaults.coordinate} {int(share.argmax()) + 1}"
-    return [
-        Check(
-            "joint speed",
-            max(float(share.max()) - 1.0, 0.0),
-            TOLERANCES.replay_gap,
-            f"excess over a limit, relative; nearest to its own: {name}",
-        )
-    ]
-
-
-def _requirements(problem: Problem, fine: Replay) -> list[Check]:
-    """Values that have to be reached, limits of the actuators, the direction on a slope."""
-    checks = [
-        Check(
-            f"least {aim.name}",
-            max(least - aim(fine.values), 0.0) / (abs(least) or 1.0),
-            TOLERANCES.replay_gap,
-            f"relative, below {least:g}, in replay",
-        )
-        for aim, least in problem.at_least
-    ]
+        yield "replay gap", unexplained, at.replay_gap, meaning
+    meaning = "relative: its quadrature and balance; allowed as asked for"
+    yield "replay error", fine.error, tolerance, meaning
+    meaning = f"work of the joints over {problem.regime.spent}, less 1"
+    yield "work = dissipation", fine.actuator_work / fine.work - 1, at.work_balance, meaning
+    for aim, least in problem.at_least:
+        missed = max(least - aim(fine.values), 0.0) / (abs(least) or 1.0)
+        meaning = f"relative, below {least:g}, in replay"
+        yield f"least {aim.name}", missed, at.replay_gap, meaning
     if names := problem.path_limits.names:
         nearest = names[np.argmax(fine.shares)]
         meaning = f"excess over a limit, relative, in replay; nearest to its own: {nearest}"
-        excess = max(float(fine.shares.max()) - 1.0, 0.0)
-        checks.append(Check("actuators", excess, TOLERANCES.replay_gap, meaning))
+        yield "actuators", max(float(fine.shares.max()) - 1.0, 0.0), at.replay_gap, meaning
     if problem.regime.towards is not None:
         meaning = "of the way, off the one that was asked for [rad]"
-        checks.append(Check("direction", fine.across / fine.distance, TOLERANCES.angle, meaning))
-    return checks
-
-
-def _one_motion(problem: Problem, fine: Replay) -> Check:
-    """Change of the objective by other balanced motions: where the law leaves it open no mesh
-    decides it, and as much is allowed as delta may change."""
+        yield "direction", fine.across / fine.distance, at.angle, meaning
+    # change of the objective by other balanced motions: where the law leaves it open no mesh
+    # decides it, and as much is allowed as delta may change
     if problem.regime.slides and not problem.regime.froude:
-        meaning = (
-            "part of the period at which several motions are balanced; what they would "
-            "change is not measured"
-        )
-        return Check("one motion", fine.several, TOLERANCES.nonunique_fraction, meaning)
+        meaning = "part of the period at which several motions are balanced; what they would "
+        meaning += "change is not measured"
+        yield "one motion", fine.several, at.nonunique_fraction, meaning
+        return
     if problem.regime.froude:
         meaning = "between the motions that follow from slow motion and from rest"
     elif problem.law.associated:
         meaning = "the law leaves one balanced motion"
-    elif not isinstance(problem.body, Chain):
+    elif not isinstance(body, Chain):
         meaning = "other balanced motions of a smooth body are not looked for"
     elif fine.several == 0:
         meaning = f"no other balanced motion was found at {fine.instants} instants"
     else:
         meaning = f"several motions are balanced at {fine.several:.2g} of the period"
-    allowed = problem.body.defaults.delta_influence
-    return Check("one motion", fine.ambiguity, allowed, f"relative; {meaning}")
-
-
-def _mesh_error(answer: Answer) -> tuple[Check, ...]:
-    problem, tolerance = answer.problem, answer.problem.mesh_tolerance
-    if tolerance == 0:
-        return ()
-    error = mesh_error(
-        control_problem(problem), answer.mesh, answer.gait, answer.delta_per_period, tolerance
-    )
-    meaning = f"of the {problem.objective.name}, relative, from defects between nodes"
-    return (Check("mesh error", error.estimate, tolerance, meaning),)
+    yield "one motion", fine.ambiguity, usual.delta_influence, f"relative; {meaning}"

@@ -1,97 +1,77 @@
-"""Results of stages, stored as they appear and read again by the next run of the same problem.
+"""Results of stages, stored as they appear and read again by the next run of the same problem; and
+stages computed ahead in other processes.
 
 A stage is a function of values. So its result is stored under a digest of its name and arguments,
 and a run that was interrupted goes on by calling every stage once more: what is stored takes no
-time, and the end is the same to the last bit.
+time, and the end is the same to the last bit. Results of other processes become known to the run in
+the same way, so the answer does not depend on how many there are.
 """
 
 from __future__ import annotations
 
 import functools
-import inspect
+import importlib
 import json
+import pickle
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+import numpy as np
+
 from colloc.gaits import gait_fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import is_visible
+from colloc.reduced.program import SearchSpace
 from colloc.results.answer import Answer, SecondOrder, Step
 from colloc.results.checks import Certificate, Check
 from colloc.results.solution import Solution
-from colloc.search.iterate import Iterate
+from colloc.search.iterate import SPACES, Iterate, space_of
 from colloc.search.options import OPTIONS
-from colloc.search.spaces import SPACES, space_of
-from colloc.system.errors import ReadOnlyRunWarning, StoreError
+from colloc.system.environment import available_threads
+from colloc.system.errors import CollocError, ReadOnlyRunWarning, StoreError
 from colloc.system.interruption import interruptible, time_limit
 from colloc.system.plain_values import Codec
 from colloc.system.row_file import put_rows, read_rows
+from colloc.system.task_pool import process_pool, worker_environment
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-ROWS = "colloc run 3"
+ROWS = "colloc run 4"
 STAGES = ("explore", "follow", "descend", "refine", "confirm", "certify")
 _PROBLEM = "problem"
 
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """Progress of a solve.
+    """Progress of a solve: `done` of `count` starts, gaits followed to the final delta, levels of
+    delta, or meshes; fewer may be enough."""
 
-    Attributes
-    ----------
-    stage : str
-        "explore", "follow", "descend", "refine", "confirm" or "certify".
-    done, count : int
-        Starts, gaits followed to the final delta, levels of delta, or meshes; fewer may be enough.
-    best : Iterate, optional
-        The best gait so far; one that shrank only if none of finite size is known.
-    seconds : float
-    round : int
-        Times the stages were begun: again for another gait, a smaller delta, or off a saddle.
-    """
-
-    stage: str
+    stage: str  # of `STAGES`
     done: int
     count: int
-    best: Iterate | None
+    best: Iterate | None  # one that shrank only if none of finite size is known
     seconds: float
-    round: int = 1
+    round: int = 1  # times the stages were begun: for another gait, a smaller delta, off a saddle
 
     def __str__(self) -> str:
-        text = f"{self.stage}, {self.done} of {self.count}"
-        if self.round > 1:
-            text = f"round {self.round}, {text}"
-        if self.best is None:
+        text = f"round {self.round}, " if self.round > 1 else ""
+        text += f"{self.stage}, {self.done} of {self.count}"
+        if (best := self.best) is None:
             return text
-        best = self.best
-        return (
-            f"{text}; best {best.problem.objective.short} = {best.value:.4f} at delta = "
-            f"{best.delta:.0e}"
-        )
+        name = best.problem.objective.short
+        return f"{text}; best {name} = {best.value:.4f} at delta = {best.delta:.0e}"
 
 
 @dataclass(eq=False)
 class Run:
-    """Results of one solve.
-
-    Parameters
-    ----------
-    path : path, optional
-        File that stores them.
-    problem : Problem, optional
-        Problem that is solved; stored problems are differences from it.
-    progress : callable, optional
-        Called with every `Progress`.
-    stores : bool
-        Store results in `rows` without a file too.
-    """
+    """Results of one solve: in a file, if there is a path; else, with `stores`, in `rows` alone."""
 
     path: Path | None = None
     problem: Problem | None = None
@@ -103,19 +83,15 @@ class Run:
 
     def __post_init__(self) -> None:
         self._begin = self._last_write = time.monotonic()
-        self._stage, self._round = STAGES[0], 1
+        self._stage, self._round, self._seconds = STAGES[0], 1, np.inf
+        self.ahead = Ahead(self)
         self.rows: dict[str, Any] = {}
         self._pending: dict[str, Any] = {}
-        self._problems: dict[str, Problem] = {}
-        self._spaces: dict[str, Any] = {}
         self._disk_refused = False
+        self.stores = self.stores or self.path is not None
         if self.problem is None:
             return
-        self._stated = self.problem.to_dict()
-        records = [Answer, Certificate, Check, Iterate, SecondOrder, Step]
-        by_rule: dict[type, Any] = {Problem: (self._changes, self._with_changes)}
-        by_rule |= dict.fromkeys(SPACES, (self._space_arguments, self._space))
-        self._codec = Codec([*records, *gait_fields.GAITS, *gait_fields.CLASSES], by_rule)
+        self.codec = _codec()
         if self.path is None:
             return
         try:
@@ -131,58 +107,25 @@ class Run:
                 f"again."
             )
 
-    def _changes(self, problem: Problem) -> dict[str, Any]:
-        stated = problem.to_dict()
-        return {
-            name: stated.get(name)
-            for name in {*stated, *self._stated}
-            if stated.get(name) != self._stated.get(name)
-        }
-
-    def _with_changes(self, changes: dict[str, Any]) -> Problem:
-        key = json.dumps(changes, sort_keys=True)
-        if key not in self._problems:
-            stated = {**self._stated, **changes}
-            self._problems[key] = Problem.from_dict(
-                {name: value for name, value in stated.items() if value is not None}
-            )
-        return self._problems[key]
-
-    def _space_arguments(self, space: Any) -> Any:
-        return self.encode((space.control.problem, None, space.edges, space.scheme, space.far))
-
-    def _space(self, arguments: Any) -> Any:
-        key = json.dumps(arguments, sort_keys=True)
-        if key not in self._spaces:
-            self._spaces[key] = space_of(*self.decode(arguments))
-        return self._spaces[key]
-
-    def encode(self, value: Any) -> Any:
-        """The value as JSON can hold it."""
-        return self._codec.encode(value)
-
-    def decode(self, plain: Any) -> Any:
-        return self._codec.decode(plain)
-
-    def update(self, rows: Mapping[str, Any]) -> None:
+    def update(self, rows: dict[str, Any]) -> None:
         """Add results of another run of the same problem."""
         self.rows.update(rows)
         self._pending.update(rows)
 
-    def result(self, stage: str, arguments: tuple, compute: Callable[[], Result]) -> Result:
+    def result(self, stage: Callable[..., Result], arguments: tuple) -> Result:
         """The stored result of a stage, else the computed one, which is stored."""
-        stores = self.stores or self.path is not None
-        if not stores and not self.rows:
-            return compute()
-        key = f"{stage} {gait_fields.statement_hash(self.encode(arguments))}"
+        if not self.stores and not self.rows:
+            return stage(*arguments)
+        digest = gait_fields.statement_hash(self.codec.encode(arguments))
+        key = f"{stage.__name__} {digest}"
         if key in self.rows:
             with suppress(KeyError, TypeError, ValueError):
-                stored = self.decode(self.rows[key])
+                stored = self.codec.decode(self.rows[key])
                 self.n_reused += 1
                 return stored
-        value = compute()
-        if stores:
-            self.rows[key] = self._pending[key] = self.encode(value)
+        value = stage(*arguments)
+        if self.stores:
+            self.rows[key] = self._pending[key] = self.codec.encode(value)
             late = time.monotonic() - self._last_write > OPTIONS.checkpoint_interval
             if late and not self._disk_refused:
                 self.write()
@@ -194,9 +137,8 @@ class Run:
         A refused file is left as it was, and tried again at the end of the run.
         """
         self._last_write = time.monotonic()
-        if self.path is None or not self._pending:
+        if self.path is None or self.problem is None or not self._pending:
             return
-        assert self.problem is not None
         try:
             put_rows(self.path, ROWS, {_PROBLEM: self.problem.hash, **self._pending})
             self._pending = {}
@@ -209,16 +151,24 @@ class Run:
                 if self.path.stat().st_size == 0:
                     self.path.unlink()
 
+    def has_time(self) -> bool:
+        """True if there is time for another start, or another gait to follow."""
+        return time.monotonic() < self._begin + OPTIONS.exploring * self._seconds
+
     def report(self, stage: str, done: int, count: int, best: Iterate | None = None) -> None:
         """Report how far a stage has come, and its best gait: one of finite size is preferred to
         one that shrank."""
         if (self._stage, stage) == ("follow", "descend"):
             return  # each gait is followed by a descent of its own
+
+        def may_be_the_answer(iterate: Iterate) -> bool:
+            return iterate.problem.shrinking or is_visible(iterate.gait)
+
         if best is not None and (
             self.best is None
             or best.delta < self.best.delta
-            or _may_be_the_answer(best)
-            or not _may_be_the_answer(self.best)
+            or may_be_the_answer(best)
+            or not may_be_the_answer(self.best)
         ):
             self.best = best
         self._round += STAGES.index(stage) < STAGES.index(self._stage)
@@ -230,7 +180,7 @@ class Run:
     def active(self, seconds: float) -> Iterator[None]:
         """A block whose stages store their results here, ended by KeyboardInterrupt at Ctrl-C or
         after so many seconds. New results are written however it ends."""
-        token = _ACTIVE.set(self)
+        token, self._seconds = _ACTIVE.set(self), seconds
         try:
             with interruptible(polled=False), time_limit(seconds):
                 yield
@@ -239,8 +189,96 @@ class Run:
             _ACTIVE.reset(token)
 
 
-def _may_be_the_answer(iterate: Iterate) -> bool:
-    return iterate.problem.shrinking or is_visible(iterate.gait)
+def _codec() -> Codec:
+    """Encoder of all that stages take and return; a problem as it is stated, a space by what makes
+    it, each made once."""
+    known: dict[str, Any] = {}
+
+    def once(plain: Any, make: Callable[[Any], Any]) -> Any:
+        key = json.dumps(plain, sort_keys=True)
+        if key not in known:
+            known[key] = make(plain)
+        return known[key]
+
+    def stated(problem: Problem) -> Any:
+        plain = problem.to_dict()
+        once(plain, lambda _: problem)  # from other processes it comes back
+        return plain
+
+    def arguments(space: SearchSpace) -> Any:
+        return codec.encode((space.control.problem, space.edges, space.scheme, space.far))
+
+    def space(plain: Any) -> Any:
+        return once(plain, lambda plain: space_of(*codec.decode(plain)))
+
+    records = [Answer, Certificate, Check, Iterate, SecondOrder, Step]
+    by_rule: dict[type, Any] = dict.fromkeys(SPACES, (arguments, space))
+    by_rule[Problem] = stated, lambda plain: once(plain, Problem.from_dict)
+    codec = Codec([*records, *gait_fields.GAITS, *gait_fields.CLASSES], by_rule)
+    return codec
+
+
+class Ahead:
+    """Processes that compute ahead, one for each other processor, begun when there is enough left
+    to do; they end with the exploration, whatever they do."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._pool: Executor | None = None
+        self._futures: dict[str, Future[dict[str, Any]]] = {}
+        self.count = 0
+
+    def begin(self, seconds_left: float) -> None:
+        count = available_threads() - 1
+        problem = self._run.problem
+        if self._pool or problem is None or count == 0 or seconds_left < OPTIONS.worth_a_process:
+            return
+        try:
+            pickle.dumps(problem)
+        except (pickle.PicklingError, AttributeError, TypeError):
+            return  # a part of the problem is known in this process only
+        self._pool, self.count = process_pool(count), count
+
+    def submit(self, number: int, function: Callable[..., object], *arguments: Any) -> None:
+        """Call a function of a module, with arguments that a run can store, in another process;
+        the search does its own share of such numbered pieces."""
+        problem = self._run.problem
+        if self._pool is None or problem is None or number % (self.count + 1) == 0:
+            return
+        if (task := self._task(function, arguments)) not in self._futures:
+            with suppress(BrokenExecutor), worker_environment(), interruptible():
+                self._futures[task] = self._pool.submit(_rows_of, problem, task)
+
+    def wait_for(self, function: Callable[..., object], *arguments: Any) -> None:
+        """Wait for a call that was submitted and has begun; the run knows its results then."""
+        future = self._futures.pop(self._task(function, arguments), None) if self._pool else None
+        if future is None or future.cancel():
+            return
+        while not future.done():
+            with interruptible():  # Ctrl-C is held back no longer than a tenth of a second
+                wait([future], timeout=0.1)
+        with suppress(BrokenExecutor, CancelledError):
+            self._run.update(future.result())
+
+    def _task(self, function: Callable[..., object], arguments: tuple) -> str:
+        encoded = self._run.codec.encode(arguments)
+        return json.dumps([function.__module__, function.__name__, encoded])
+
+    def end(self) -> None:
+        pool, self._pool, self.count, self._futures = self._pool, None, 0, {}
+        if pool is not None:
+            processes = list((getattr(pool, "_processes", None) or {}).values())
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in processes:  # what they compute is of no use any more
+                process.kill()
+
+
+def _rows_of(problem: Problem, task: str) -> dict[str, Any]:
+    module, name, arguments = json.loads(task)
+    run = Run(problem=problem, stores=True)
+    with suppress(CollocError), run.active(np.inf):
+        getattr(importlib.import_module(module), name)(*run.codec.decode(arguments))
+    return run.rows
 
 
 _ACTIVE: ContextVar[Run] = ContextVar("run")
@@ -253,15 +291,11 @@ def active_run() -> Run:
 
 
 def checkpointed(stage: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """A function of values whose results are stored in the run under way, by name and arguments."""
-    signature = inspect.signature(stage)
+    """A function of values, called without names of its arguments, whose results are stored in the
+    run under way."""
 
     @functools.wraps(stage)
-    def stored(*positional: Arguments.args, **named: Arguments.kwargs) -> Result:
-        arguments = signature.bind(*positional, **named)
-        arguments.apply_defaults()
-        return active_run().result(
-            stage.__name__, arguments.args, lambda: stage(*positional, **named)
-        )
+    def stored(*arguments: Arguments.args, **_: Arguments.kwargs) -> Result:
+        return active_run().result(stage, arguments)
 
     return stored

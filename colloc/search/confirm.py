@@ -1,4 +1,4 @@
-"""A gait as a solution of the full nonlinear program, confirmed by IPOPT.
+"""A gait as a solution of the full nonlinear program, by IPOPT.
 
 The full program is solved on the final mesh, from the gait that the search found, with the
 multipliers of the reduced program and, for the equations, those that come closest to stationarity.
@@ -10,48 +10,54 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from colloc.dynamics.collocated import whole_turns
+from colloc.dynamics.control_problem import ControlProblem, control_problem
+from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.problem import Problem
+from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.contact import far_pairs
-from colloc.numerics.sqp import Stationarity, stationarity
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.sqp import stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
-from colloc.results.answer import NOT_MEASURED, PRESCRIBED, REDUCED, Answer, SecondOrder
+from colloc.results.answer import NOT_MEASURED, PRESCRIBED, REDUCED, Answer, SecondOrder, Step
 from colloc.search.checkpoint import active_run, checkpointed
-from colloc.search.converge import with_kink
-from colloc.search.diagnosis import explanation
-from colloc.search.ipopt import CONFIRMING, NlpResult, Solver
-from colloc.search.iterate import NOT_STATIONARY, STATIONARY, Iterate
+from colloc.search.ipopt import (
+    NlpResult,
+    Solver,
+    explanation,
+    redundant_equations,
+    solve_in_regions,
+)
+from colloc.search.iterate import NOT_STATIONARY, STATIONARY, Iterate, space_near, space_of
+from colloc.search.optimise import delta_levels, with_kink
 from colloc.search.options import COARSE, MEDIUM, OPTIONS, TOLERANCES, max_rounds
-from colloc.search.spaces import with_far, with_whole_turns
 from colloc.transcription.full_program import ACTUATORS, AT_LEAST, FullProgram, full_program
 from colloc.transcription.layout import balanced_variables, distance_and_work, layout_of
+from colloc.verification.refinement import plan_mesh
 
 
+@checkpointed
 def confirm(iterate: Iterate) -> Answer:
     """The gait as a point of the full program, with measured first- and second-order conditions;
     `message` says what holds where IPOPT does not confirm it."""
     if not iterate.problem.gait.free:
         answer = answer_of_iterate(iterate)
         return replace(answer, status=PRESCRIBED, program=PRESCRIBED, message=iterate.message)
-    active_run().report("confirm", 0, 1, iterate)
-    return _confirm(iterate)
-
-
-@checkpointed
-def _confirm(iterate: Iterate) -> Answer:
     begin, iterate = time.perf_counter(), with_kink(iterate)
     program, result, message = _solve_full(iterate)
     answer = answer_of(program, result, iterate.delta)
-    # at the search's gait, which is on its active bounds; IPOPT's is a little inside
-    second = second_order(iterate.space, iterate.v, iterate.delta, answer.value)
     answer = replace(
         answer,
         program=REDUCED if message else iterate.problem.formulation,
         seconds=time.perf_counter() - begin,
         message=" ".join(part for part in (message, iterate.message) if part),
-        second_order=second,
+        # at the search's gait, which is on its active bounds; IPOPT's is a little inside
+        second_order=second_order(iterate.space, iterate.v, iterate.delta, answer.value),
     )
     return replace(answer, history=(*iterate.history, answer.step))
 
@@ -63,12 +69,14 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
     reduced, parameters = iterate.program(), space.full_parameters(iterate.v)
     program = full_program(space.control, parameters, mesh.edges, mesh.scheme.name, space.far)
     x = program.feasible(parameters, delta)
-    program = with_whole_turns(program, x)
+    program = _with_whole_turns(program, x)
     if reduced.actuators is not None:
         program = program.with_bounds(ACTUATORS, *reduced.actuators.every_bound())
-    solver = Solver(program, CONFIRMING)
-    multipliers = _multipliers(reduced, stationarity(reduced, iterate.v), program)
-    before = solver.measured(x, delta, *multipliers)
+    # the barrier begins where it ends, as multipliers are known: one to four steps confirm most
+    # gaits, and more than 30 lead away
+    confirming: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}
+    solver = Solver(program, confirming)
+    before = solver.measured(x, delta, *_multipliers(reduced, iterate.v, program))
     feasible = before.violation < TOLERANCES.violation
     # at the iterate, by the conditions of the reduced program
     here = replace(
@@ -81,40 +89,12 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
     if iterate.violation > OPTIONS.confirm_radius:  # no gait within reach is admissible
         return program, failed, explanation(program, failed, delta)
     if iterate.on_kink and feasible:
-        return (
-            program,
-            here,
-            f"The optimum is a kink of the objective: gradients on its sides cancel (to "
-            f"{here.kkt_error:.1e}).",
-        )
-    last, result, ended = _solve_within(solver, reduced, x, before, delta)
-    if not ended:
-        return last, result, ""
-    kind = iterate.problem.formulation
-    if before.optimal:
-        return (
-            last,
-            replace(before, status=STATIONARY),
-            f"First-order conditions hold (KKT error {before.kkt_error:.1e} on the {kind} "
-            f"program); {ended}.",
-        )
-    if iterate.optimal and feasible:
-        # with friction as steep as 1 / delta, multipliers of the balance are known to fewer digits
-        # than the conditions need
-        where = f"KKT error {here.kkt_error:.1e}; {before.kkt_error:.1e} on the {kind} program"
-        text = f"First-order conditions hold in the reduced space ({where}); {ended}."
-        return last, here, text
-    return last, failed, f"{explanation(last, failed, delta)} {ended}."
-
-
-def _solve_within(
-    solver: Solver, reduced: ReducedProgram, x: np.ndarray, before: NlpResult, delta: float
-) -> tuple[FullProgram, NlpResult, str]:
-    """The program as last stated, where IPOPT ended, and how, if that is no admissible optimum
-    within reach."""
-    program, radius = solver.program, OPTIONS.confirm_radius
-    result = solver.solve_within(x, delta, (before.lam_x, before.lam_g), radius)
-    own = program.layout.decisions[reduced.space.own]
+        kink = "The optimum is a kink of the objective: gradients on its sides cancel"
+        return program, here, f"{kink} (to {here.kkt_error:.1e})."
+    result = solver.solve_within(
+        x, delta, (before.lam_x, before.lam_g), radius := OPTIONS.confirm_radius
+    )
+    own = program.layout.decisions[space.own]
     # beyond its checks by what SQP allows; at last, where the worst instant swings, by what a
     # certificate lets pass
     rounds = max_rounds(COARSE)
@@ -124,94 +104,44 @@ def _solve_within(
         if reduced.place_rows(result.x[own]) <= allowed:
             return program, result, ""
         program, x = program.moved_to(result.x)
-        again = Solver(program, CONFIRMING).solve_within(x, delta, None, radius)
+        again = Solver(program, confirming).solve_within(x, delta, None, radius)
         result = again.accumulate(result)
+    ended = f"ended with {result.status} at a KKT error of {result.kkt_error:.1e}"
     if result.optimal:
-        ended = f"IPOPT, begun there, moved the gait beyond its limits {rounds} times"
-        return program, result, ended
-    error = f"at a KKT error of {result.kkt_error:.1e}"
-    return program, result, f"IPOPT, begun there, ended with {result.status} {error}"
-
-
-def answer_of(program: FullProgram, result: NlpResult, delta: float) -> Answer:
-    """A point of a full program, as an answer to the stated problem."""
-    gait, n = program.member(result.x), program.layout.n
-    distance, work = distance_and_work(program.control, program.layout, result.x)
-    answer = Answer(
-        program.control.problem,
-        gait,
-        delta,
-        edges=program.control.in_phases(program.mesh, gait).edges,
-        scheme=program.mesh.scheme.name,
-        x=result.x[:n],
-        lam_x=result.lam_x[:n],
-        lam_g=result.lam_g,
-        value=program.control.stated(-result.objective),
-        distance=distance,
-        work=work,
-        kkt_error=result.kkt_error,
-        violation=result.violation,
-        complementarity=result.complementarity,
-        status=result.status,
-        optimal=result.optimal,
-        iterations=result.iterations,
-        seconds=result.seconds,
-        program=program.control.formulation,
-    )
-    return replace(answer, history=(answer.step,))
-
-
-def answer_of_iterate(iterate: Iterate) -> Answer:
-    """The gait as the search found it, every other variable from its balance."""
-    space, control = iterate.space, iterate.space.control
-    mesh, layout = space.mesh, layout_of(control, space.mesh)
-    x = balanced_variables(control, layout, mesh, space.full_parameters(iterate.v), iterate.delta)
-    distance, work = distance_and_work(control, layout, x)
-    return Answer(
-        iterate.problem,
-        iterate.gait,
-        iterate.delta,
-        edges=control.in_phases(mesh, iterate.gait).edges,
-        scheme=mesh.scheme.name,
-        x=x,
-        lam_x=np.zeros_like(x),
-        lam_g=np.empty(0),
-        value=iterate.value,
-        distance=distance,
-        work=work,
-        kkt_error=iterate.kkt_error,
-        violation=iterate.violation,
-        complementarity=iterate.complementarity,
-        status=iterate.step.status,
-        optimal=iterate.optimal,
-        iterations=iterate.step.iterations,
-        seconds=iterate.step.seconds,
-        history=iterate.history,
-    )
-
-
-def second_order(space: SearchSpace, v: np.ndarray, delta: float, value: float) -> SecondOrder:
-    """Curvature of the Lagrangian at v over a value of the objective, with all pairs of links kept
-    apart."""
-    if v.size > OPTIONS.max_curvature_parameters:
-        return replace(NOT_MEASURED, why_not=f"not measured, for {v.size} parameters")
-    program = ReducedProgram(with_far(space, far_pairs(space.control.dynamics.body)), delta)
-    program.place_rows(v)
-    here, size = curvature(program, v), abs(value / program.stated(-1.0))
-    if not here.kkt_error < MEDIUM * size:  # elsewhere a curvature means nothing
-        return replace(
-            NOT_MEASURED,
-            why_not="not measured, where the gradient of the reduced program does not vanish",
+        ended = f"moved the gait beyond its limits {rounds} times"
+    ended, kind = f"IPOPT, begun there, {ended}", iterate.problem.formulation
+    if before.optimal:
+        where = f"KKT error {before.kkt_error:.1e} on the {kind} program"
+        text = f"First-order conditions hold ({where}); {ended}."
+        return program, replace(before, status=STATIONARY), text
+    if iterate.optimal and feasible:
+        # with friction as steep as 1 / delta, multipliers of the balance are known to fewer digits
+        # than the conditions need
+        where = f"KKT error {here.kkt_error:.1e}; {before.kkt_error:.1e} on the {kind} program"
+        return (
+            program,
+            here,
+            f"First-order conditions hold in the reduced space ({where}); {ended}.",
         )
-    return SecondOrder(here.smallest / size, here.error / size, here.n_free)
+    return program, failed, f"{explanation(program, failed, delta)} {ended}."
+
+
+def _with_whole_turns(program: FullProgram, x: np.ndarray) -> FullProgram:
+    """The program with the net rotation of an antipodal gait closed as variables x close it."""
+    if program.control.aims.closing != ANTIPODAL or "rotation" not in program.groups:
+        return program
+    theta = x[program.layout.theta[0]]
+    turns = np.array([whole_turns(theta[0], theta[-1])])
+    return program.with_bounds("rotation", turns, turns)
 
 
 def _multipliers(
-    reduced: ReducedProgram, conditions: Stationarity, program: FullProgram
+    reduced: ReducedProgram, v: np.ndarray, program: FullProgram
 ) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
     lam_x, lam_g = np.zeros(program.n), np.zeros(program.row_lower.size)
-    space, n_least = reduced.space, len(reduced.space.control.aims.at_least)
+    conditions, space = stationarity(reduced, v), reduced.space
+    n_least = len(space.control.aims.at_least)
     n_of_period = conditions.on_rows.size - reduced.constraints.lower.size
     on_period, on_shape = np.split(conditions.on_rows, [n_of_period])
     if reduced.actuators is not None:
@@ -229,3 +159,128 @@ def _multipliers(
         at += cells.size
     lam_x[program.layout.decisions[space.own]] = conditions.on_bounds
     return lam_x, lam_g
+
+
+def _answer(
+    control: ControlProblem,
+    mesh: Mesh,
+    gait: AnyGait,
+    x: np.ndarray,
+    conditions: Iterate | NlpResult,
+    effort: Step | NlpResult,
+    **fields: Any,
+) -> Answer:
+    distance, work = distance_and_work(control, layout_of(control, mesh), x)
+    names = ("kkt_error", "violation", "complementarity", "optimal")
+    fields |= {name: getattr(conditions, name) for name in names}
+    fields |= {name: getattr(effort, name) for name in ("status", "iterations", "seconds")}
+    edges = control.in_phases(mesh, gait).edges
+    return Answer(
+        *(control.problem, gait),
+        edges=edges,
+        scheme=mesh.scheme.name,
+        x=x,
+        distance=distance,
+        work=work,
+        **fields,
+    )
+
+
+def answer_of(program: FullProgram, result: NlpResult, delta: float) -> Answer:
+    """A point of a full program, as an answer to the stated problem."""
+    control, n = program.control, program.layout.n
+    answer = _answer(
+        *(control, program.mesh, program.member(result.x), result.x[:n], result, result),
+        delta=delta,
+        lam_x=result.lam_x[:n],
+        lam_g=result.lam_g,
+        value=control.stated(-result.objective),
+        program=control.formulation,
+    )
+    return replace(answer, history=(answer.step,))
+
+
+def answer_of_iterate(iterate: Iterate) -> Answer:
+    """The gait as the search found it, every other variable from its balance."""
+    space, control, mesh = iterate.space, iterate.space.control, iterate.space.mesh
+    parameters, layout = space.full_parameters(iterate.v), layout_of(control, mesh)
+    x = balanced_variables(control, layout, mesh, parameters, iterate.delta)
+    return _answer(
+        *(control, mesh, iterate.gait, x, iterate, iterate.step),
+        delta=iterate.delta,
+        lam_x=np.zeros_like(x),
+        lam_g=np.empty(0),
+        value=iterate.value,
+        history=iterate.history,
+    )
+
+
+def second_order(space: SearchSpace, v: np.ndarray, delta: float, value: float) -> SecondOrder:
+    """Curvature of the Lagrangian at v over a value of the objective, with all pairs of links kept
+    apart."""
+    if v.size > OPTIONS.max_curvature_parameters:
+        return replace(NOT_MEASURED, why_not=f"not measured, for {v.size} parameters")
+    far, problem = far_pairs(space.control.dynamics.body), space.control.problem
+    program = ReducedProgram(space_of(problem, space.edges, space.scheme, far), delta)
+    program.place_rows(v)
+    here, size = curvature(program, v), abs(value / program.stated(-1.0))
+    if not here.kkt_error < MEDIUM * size:  # elsewhere a curvature means nothing
+        text = "not measured, where the gradient of the reduced program does not vanish"
+        return replace(NOT_MEASURED, why_not=text)
+    return SecondOrder(here.smallest / size, here.error / size, here.n_free)
+
+
+def solve_directly(problem: Problem) -> Answer:
+    """A local optimum by IPOPT alone, at every level of delta, from the guess and the balance
+    solver: what a reader of the equations would try first, and what the reduced search is measured
+    against. It ends at the first level or mesh that fails, and its message says what did."""
+    history, run = tuple[Step, ...](), active_run()
+    space, v = space_near(problem, problem.guess)
+    parameters, mesh = space.full_parameters(v), space.mesh
+    levels = delta_levels(problem, problem.delta_start)
+    for done, delta in enumerate(levels):
+        run.report("descend", done, len(levels))
+        answer = _solve_from(problem, parameters, delta, mesh.edges, mesh.scheme.name)
+        history = (*history, answer.step)
+        if not answer.optimal:
+            return replace(answer, history=history)
+        parameters = answer.x[answer.layout.decisions]
+    knots = np.empty(0)
+    for done in range(OPTIONS.meshes if problem.mesh_tolerance > 0 else 0):
+        run.report("refine", done, OPTIONS.meshes)
+        gait, control = answer.gait, space.control
+        mesh, speed = control.in_phases(space.mesh, gait), answer.delta_per_period
+        plan = plan_mesh(control, mesh, gait, speed, problem.mesh_tolerance, kept=knots)
+        if plan is None:
+            break
+        knots = np.concatenate([knots, plan.kept])
+        space, v = space_near(problem, gait, plan.edges, plan.scheme)
+        parameters = space.full_parameters(v)
+        answer = _solve_from(problem, parameters, delta, space.mesh.edges, plan.scheme)
+        history = (*history, answer.step)
+        if not answer.optimal:
+            return replace(answer, history=history)
+    space, v = space_near(problem, answer.gait, answer.edges, answer.scheme)
+    curved = second_order(space, v, answer.delta, answer.value)
+    return replace(answer, second_order=curved, history=history)
+
+
+@checkpointed
+def _solve_from(
+    problem: Problem, parameters: np.ndarray, delta: float, edges: np.ndarray, scheme: str
+) -> Answer:
+    program = full_program(control_problem(problem), parameters, edges, scheme)
+    x = program.feasible(parameters, delta)
+    program = _with_whole_turns(program, x)
+    # from a guess IPOPT may need five hundred iterations
+    last, result = solve_in_regions(program, x, delta, OPTIONS.radius, {"max_iter": 1500})
+    answer = answer_of(last, result, delta)
+    if result.optimal:
+        return answer
+    text = explanation(last, result, delta)
+    if redundant := redundant_equations(Solver(program), x, delta):
+        text += (
+            f" Before the first solve the equations were rank deficient, which no optimiser "
+            f"bears: {', '.join(redundant)}."
+        )
+    return replace(answer, message=text)

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.dynamics.control_problem import ControlProblem, control_problem
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.coupled import Coupled
-from colloc.gaits.fitted_gait import FittedGait, Given, Uncertainty, fitted_gait
+from colloc.gaits.fitted_gait import Given, Uncertainty, fitted_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
@@ -29,16 +29,10 @@ from colloc.results.solution import Solution
 from colloc.search.certify import certify, goes_nowhere
 from colloc.search.confirm import answer_of_iterate
 from colloc.search.iterate import evaluate_at
-from colloc.search.options import OPTIONS, TOLERANCES
+from colloc.search.options import OPTIONS, TOLERANCES, settings
 from colloc.smooth.prescribed_body import schedule
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.refinement import plan_mesh
-
-_PHASES = 256
-_ROUGHLY = 1.25
-"""Allowance for the mesh, which is made for the smoothed gait."""
-_DRAWN = 4
-"""Random changes of a series that are tried, each both ways."""
 
 
 def evaluate(
@@ -99,44 +93,33 @@ def evaluate(
         harmonics=harmonics,
         degrees=degrees,
     )
-    if fitted.centre:
-        _check_centre(problem, fitted, gait)
+    series = fitted.gait
+    if (
+        fitted.centre
+    ):  # servo angles about a right angle: all joints bent alike, and links that cross
+        angles, _ = problem.joint_path(*series(np.arange(256) / 256))
+        if float(crossing_depth(problem.body, angles).max()) > TOLERANCES.kkt:
+            raise ProblemError(
+                f"{gait}: all joints move about {fitted.centre}°, where links cross: if servos "
+                f"stand so when the body is straight, subtract it from every column of angles."
+            )
     # refuses one that does not say a pace which the problem leaves open
-    problem.regime.at(fitted.gait)
-    solution = _evaluate_fit(problem, fitted)
-    solution.seconds = time.monotonic() - begin
-    return solution
-
-
-def _check_centre(problem: Problem, fitted: FittedGait, given: Given) -> None:
-    """Refuse servo angles about a right angle: all joints bent alike, and links that cross."""
-    phases = np.arange(_PHASES) / _PHASES
-    angles, _ = problem.joint_path(*fitted.gait(phases))
-    if float(crossing_depth(problem.body, angles).max()) > TOLERANCES.kkt:
-        raise ProblemError(
-            f"{given}: all joints move about {fitted.centre}°, where links cross: if servos stand "
-            f"so when the body is "
-            "straight, subtract it from every column of angles."
-        )
-
-
-def _evaluate_fit(problem: Problem, fitted: FittedGait) -> Solution:
-    gait_class: AnyClass = Harmonic(fitted.gait.n_harmonic)
-    gait: AnyGait = fitted.gait
+    problem.regime.at(series)
+    gait_class: AnyClass = Harmonic(series.n_harmonic)
+    driven: AnyGait = series
     if isinstance(problem.gait, Coupled):
         gait_class = replace(problem.gait, gait=gait_class)
-        gait = gait_class.driven_by(gait, problem.body.n_joint)
-    length = 2 * math.pi * gait.shape_speed
-    if gait.shape_speed < problem.smallest_shape_speed:
+        driven = gait_class.driven_by(series, problem.body.n_joint)
+    length, least = 2 * math.pi * driven.shape_speed, problem.smallest_shape_speed
+    if driven.shape_speed < least:
         raise ProblemError(
-            f"the gait hardly moves: its shape speed {gait.shape_speed:.3g} is below "
-            f"smallest_shape_speed "
-            f"{problem.smallest_shape_speed:g}, where friction is viscous."
+            f"the gait hardly moves: its shape speed {driven.shape_speed:.3g} is below "
+            f"smallest_shape_speed {least:g}, where friction is viscous."
         )
     delta = problem.delta * (length if problem.gait.relative_delta else 1.0)
     usual = {"guess": None, "delta_start": None, "intervals": None}
     stated = problem.with_(gait=gait_class, rotation=None, delta=delta, **usual)
-    answer = _answer(stated, gait)
+    answer = _answer(stated, driven)
     turned = answer.motion.rotation
     if abs(turned) < TOLERANCES.replay_gap * answer.distance:
         if not problem.uses("rotation"):  # which then may be anything
@@ -144,42 +127,46 @@ def _evaluate_fit(problem: Problem, fitted: FittedGait) -> Solution:
             answer = replace(answer, problem=stated)
     else:  # how far it goes is then the chord of its arc
         stated = stated.with_(rotation=turned)
-        answer = _answer(stated, gait)
-    if goes_nowhere(answer):
-        said = (
-            "It goes nowhere for its work, so there is no value to certify: is it one that "
-            "retraces its path?"
-        )
-        return Solution(stated, answer, message=f"{fitted.describe()}. {said}")
+        answer = _answer(stated, driven)
     certificate, said = UNCERTIFIED, ""
-    try:
-        certificate = certify(answer)
-        failures = ", ".join(
-            f"{check.name} {check.value:.1e} (allowed {check.threshold:.0e})"
-            for check in certificate.failures
-        )
-        said = f" It fails: {failures}." if failures else ""
-    except NotConvergedError as error:
-        said = f" The replay failed: {error}"
-    if fitted.uncertainty is not None and certificate.replayed:
-        errors, missed = _errors_of_samples(answer, fitted.gait, fitted.uncertainty)
-        if errors[0] > certificate.value_error:
-            what = (
-                f"{problem.objective.short} uncertain by {errors[0]:.1e} (two standard "
-                f"deviations{missed})"
+    if goes_nowhere(answer):
+        said = " It goes nowhere for its work, so there is no value to certify: is it one that "
+        said += "retraces its path?"
+    else:
+        try:
+            certificate = certify(answer)
+            failures = ", ".join(
+                f"{check.name} {check.value:.1e} (allowed {check.threshold:.0e})"
+                for check in certificate.failures
             )
+            said = f" It fails: {failures}." if failures else ""
+        except NotConvergedError as error:
+            said = f" The replay failed: {error}"
+    if fitted.uncertainty is not None and certificate.replayed:
+        errors, missed = _errors_of_samples(answer, series, fitted.uncertainty)
+        if errors[0] > certificate.value_error:
+            name = problem.objective.short
+            what = f"{name} uncertain by {errors[0]:.1e} (two standard deviations{missed})"
             said = f" Samples that far off leave {what}.{said}"
         certificate = certificate.with_samples(errors)
-    return Solution(stated, answer, certificate, message=f"{fitted.describe()}.{said}")
+    message = f"{fitted.describe()}.{said}"
+    solution = Solution(stated, answer, certificate, message=message, settings=settings())
+    solution.seconds = time.monotonic() - begin
+    return solution
 
 
 def _answer(problem: Problem, gait: AnyGait) -> Answer:
     """The gait on a mesh that meets the problem's tolerance; on a first mesh if it goes nowhere."""
-    begin = time.perf_counter()
-    control = control_problem(problem)
+    begin, control = time.perf_counter(), control_problem(problem)
     parameters = control.admissible.parameters(gait)
+
+    def on(mesh: Mesh) -> Answer:
+        space = SearchSpace(control, mesh.edges, mesh.scheme.name, full=parameters)
+        answer = answer_of_iterate(evaluate_at(space, np.empty(0), problem.delta))
+        return replace(answer, status=EVALUATED, program=EVALUATED)
+
     member, mesh, message = control.admissible.member(parameters), control.mesh(), ""
-    first, answer = mesh, _answer_on_mesh(control, mesh, parameters)
+    first, answer = mesh, on(mesh)
     meshes = OPTIONS.meshes if problem.mesh_tolerance > 0 and not goes_nowhere(answer) else 0
     for _ in range(meshes):
         plan = plan_mesh(control, mesh, member, problem.delta, problem.mesh_tolerance)
@@ -188,15 +175,9 @@ def _answer(problem: Problem, gait: AnyGait) -> Answer:
         mesh = Mesh(scheme(plan.scheme), plan.edges)
         message = "" if plan.reached else f"the mesh is accurate to {plan.estimate:.0e} only."
     if mesh is not first:
-        answer = _answer_on_mesh(control, mesh, parameters)
+        answer = on(mesh)
     answer = replace(answer, message=message, seconds=time.perf_counter() - begin)
     return replace(answer, history=(answer.step,))
-
-
-def _answer_on_mesh(control: ControlProblem, mesh: Mesh, parameters: np.ndarray) -> Answer:
-    space = SearchSpace(control, mesh.edges, mesh.scheme.name, full=parameters)
-    iterate = evaluate_at(space, np.empty(0), control.problem.delta)
-    return replace(answer_of_iterate(iterate), status=EVALUATED, program=EVALUATED)
 
 
 def _errors_of_samples(
@@ -206,31 +187,26 @@ def _errors_of_samples(
     the part due to lack of fit, in words.
 
     The covariance of the fit goes through the gradients of the collocated motion. Near an optimum
-    these vanish and second order counts: typical changes of the series are tried, both ways. Lack
-    of fit is what a series of more harmonics changes.
+    these vanish and second order counts: four typical changes of the series are tried, both ways.
+    Lack of fit is what a series of more harmonics changes; a quarter more of it, as the mesh was
+    made for a smoother gait.
     """
     control, richer = control_problem(answer.problem), samples.richer
-    highest = max(
-        gait.n_harmonic, samples.directions.shape[2] // 2, richer.n_harmonic if richer else 0
-    )
+    n_rows = samples.directions.shape[2]
+    highest = max(gait.n_harmonic, n_rows // 2, richer.n_harmonic if richer else 0)
     # where the gait of the answer begins
     later = math.atan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * math.pi)
     phases, wide = answer.mesh.times + later, Harmonic(highest)
-    series = _Series(
-        np.stack([wide.functions(phases), wide.functions(phases, 1)]), answer.problem.joint_map
-    )
+    functions = np.stack([wide.functions(phases), wide.functions(phases, 1)])
     aims, delta = control.aims, answer.problem.delta
-    motion = ReducedMotion(control.dynamics, answer.mesh, series, aims.integrals)
+    shapes = _Series(functions, answer.problem.joint_map)
+    motion = ReducedMotion(control.dynamics, answer.mesh, shapes, aims.integrals)
     scale = np.array([control.stated(1.0), 1 / control.unit, 1.0, control.unit])
 
     def values(v: np.ndarray) -> np.ndarray:
         period = motion.values(v, delta)
-        return scale * [
-            aims.objective(period),
-            EFFICIENCY(period),
-            period["distance"],
-            period["work"],
-        ]
+        both = aims.objective(period), EFFICIENCY(period)
+        return scale * [*both, period["distance"], period["work"]]
 
     v = gait.resize(highest).table.ravel()
     known, period, slopes = values(v), motion.values(v, delta), motion.gradients(v, delta)
@@ -239,20 +215,18 @@ def _errors_of_samples(
     ]
     gradients = scale[:, None] * [*by_aim, slopes["distance"], slopes["work"]]
     changes = np.zeros((len(samples.directions), gait.n_joint, 2 * highest + 1))
-    changes[:, :, : samples.directions.shape[2]] = samples.directions
+    changes[:, :, :n_rows] = samples.directions
     changes = changes.reshape(len(changes), -1)
     noise = np.linalg.norm(gradients @ changes.T, axis=1)
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], (_DRAWN, len(changes)))
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (4, len(changes)))
     bent = [0.5 * (values(v + change) + values(v - change)) - known for change in signs @ changes]
     noise = samples.factor * (noise + np.abs(bent).max(axis=0))
     lack, missed = np.zeros(4), ""
     if richer is not None:
         lack = np.abs(values(richer.resize(highest).table.ravel()) - known)
-        missed = (
-            f", and lack of fit: {richer.n_harmonic} harmonics would change it by {lack[0]:.1e}"
-        )
-    # the mesh was made for a smoother gait
-    return tuple(np.nan_to_num(noise + _ROUGHLY * lack, nan=np.inf).tolist()), missed
+        more = f"{richer.n_harmonic} harmonics would change it by {lack[0]:.1e}"
+        missed = f", and lack of fit: {more}"
+    return tuple(np.nan_to_num(noise + 1.25 * lack, nan=np.inf).tolist()), missed
 
 
 class _Series(NamedTuple):

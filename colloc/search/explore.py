@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,20 +34,18 @@ from colloc.mechanics.chain import Chain
 from colloc.reduced.program import ReducedProgram
 from colloc.results.answer import Alternative
 from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
-from colloc.search.ahead import Ahead, computing_ahead
 from colloc.search.checkpoint import active_run
-from colloc.search.closure import project_to_zero_rotation
-from colloc.search.converge import optimise
-from colloc.search.descend import delta_levels, descend, regularisation_dominated
-from colloc.search.iterate import Iterate, evaluate_at
+from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
+from colloc.search.optimise import (
+    delta_levels,
+    descend,
+    optimise,
+    project_to_zero_rotation,
+    regularisation_dominated,
+)
 from colloc.search.options import COARSE, FINE, MEDIUM, OPTIONS
 from colloc.search.small_starts import small_loops
-from colloc.search.spaces import space_near, space_of
 from colloc.system.errors import CollocError, NotConvergedError
-
-_THREE_LINK_ELLIPSES = ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
-"""The two best ellipses of three equal links under isotropic friction: without them one harmonic of
-other bodies is missed at times, as that of `problems/purcell.py`."""
 
 
 @dataclass(eq=False)
@@ -60,48 +59,33 @@ class Candidate:
     dry_objective: float = np.inf  # at a delta that is small for all
     is_loop: bool = False
 
-    def count_start(self, *, is_new: bool) -> None:
-        candidate: Candidate | None = self
-        while candidate is not None:
-            candidate.starts += 1
-            candidate.n_new += is_new
-            candidate = candidate.next
 
+class Exploration(NamedTuple):
+    """Distinct optima of many starts."""
 
-@dataclass(frozen=True, eq=False)
-class Exploration:
-    """Distinct optima of many starts.
-
-    Attributes
-    ----------
-    optima : tuple of Iterate
-        At the final delta, best first, before their meshes are refined.
-    starts : int
-    others : tuple of Alternative
-        All distinct gaits met, best first.
-    left : tuple of Iterate
-        Gaits at a larger delta that were not followed, the most promising first.
-    failure : str
-        Why the starts led nowhere, where the guess alone is left.
-    """
-
-    optima: tuple[Iterate, ...]
+    optima: list[Iterate]  # at the final delta, best first, before their meshes are refined
     starts: int
-    others: tuple[Alternative, ...] = ()
-    left: tuple[Iterate, ...] = ()
-    failure: str = ""
+    others: Sequence[Alternative] = ()  # all distinct gaits met, best first
+    left: Sequence[Iterate] = ()  # at a larger delta, not followed, the most promising first
 
 
 def first_optimum(problem: Problem, gait: AnyGait) -> Iterate:
     """The optimum at the first delta that the search reaches from a gait.
 
     At the next delta where friction at that one is dominated by its regularisation; at the final
-    delta for a gait that is nearly an optimum there.
+    delta for a gait that is nearer to an optimum there than 0.1 rad.
     """
+    space, v = space_near(problem, gait)
     if not problem.gait.free:
-        return optimise(*space_near(problem, gait), problem.delta, FINE)
-    if (near := _final_optimum(problem, gait)) is not None:
-        return near
+        return optimise(space, v, problem.delta, FINE)
+    here = evaluate_at(space, v, problem.delta)
+    is_flat = here.kkt_error * COARSE <= OPTIONS.close * abs(here.objective)
+    if is_flat and here.violation < COARSE and problem.delta != problem.delta_start:
+        with suppress(NotConvergedError):
+            near = here if here.optimal else optimise(space, v, problem.delta, MEDIUM)
+            is_near = near.optimal and np.abs(near.v - v).max() < COARSE
+            if is_near and not regularisation_dominated(near):
+                return near
     closed = project_to_zero_rotation(problem, gait, problem.delta_start)
     space, v = space_near(problem, closed)
     active_run().report("explore", 0, 1, evaluate_at(space, v, problem.delta_start))
@@ -112,146 +96,81 @@ def first_optimum(problem: Problem, gait: AnyGait) -> Iterate:
     return optimum
 
 
-def _final_optimum(problem: Problem, gait: AnyGait) -> Iterate | None:
-    """The optimum at the problem's delta, if the gait is nearer to one than 0.1 rad."""
-    space, v = space_near(problem, gait)
-    here = evaluate_at(space, v, problem.delta)
-    is_steep = here.kkt_error * COARSE > OPTIONS.close * abs(here.objective)
-    if is_steep or not here.violation < COARSE or problem.delta == problem.delta_start:
-        return None
-    with suppress(NotConvergedError):
-        optimum = here if here.optimal else optimise(space, v, problem.delta, MEDIUM)
-        is_near = optimum.optimal and np.abs(optimum.v - v).max() < COARSE
-        if is_near and not regularisation_dominated(optimum):
-            return optimum
-    return None
-
-
-def explore(
-    problem: Problem, starts: int | None = None, has_time: Callable[[], bool] = lambda: True
-) -> Exploration:
-    """The best gaits of a problem's class that many starts lead to.
+def explore(problem: Problem, starts: int | None = None) -> Exploration:
+    """The best gaits of a problem's class that so many starts, and at most three times as many,
+    lead to: by default 32, with inertia 96, or fewer once some of them have met the best gait.
 
     Where they shrink until nobody sees them move, the search begins anew among gaits at least as
-    large as the best optimum of finite size (`smallest_shape_speed`).
-
-    Parameters
-    ----------
-    problem : Problem
-    starts : int, optional
-        Starts at least, and at most three times as many while they lead on. By default 32, with
-        inertia 96, or fewer once some of them have met the best gait.
-    has_time : callable
-        Whether there is time for another start, or another gait to follow.
-
-    Raises
-    ------
-    NotConvergedError
-        If no start leads anywhere.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> from colloc.search.explore import explore
-    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
-    >>> round(explore(problem, starts=2).optima[0].value, 2)
-    0.26
+    large as the best optimum of finite size (`smallest_shape_speed`); without one, as large as the
+    default guess is, or as is usual. `NotConvergedError` if no start leads anywhere.
     """
-    with computing_ahead(problem) as ahead:
-        any_size = _explore(problem, starts, has_time, ahead)
-        if problem.shrinking or is_finite(any_size.optima[0]) or not has_time():
+    run = active_run()
+    try:
+        any_size = _follow_promising(problem, *multistart(problem, starts))
+        if problem.shrinking or is_visible(any_size.optima[0].gait) or not run.has_time():
             return any_size
-        finite = next((optimum for optimum in any_size.optima if is_finite(optimum)), None)
+        finite = next((each for each in any_size.optima if is_visible(each.gait)), None)
         try:
-            large = _explore(_among_large(problem, finite), starts, has_time, ahead)
+            if finite:
+                size = finite.gait.shape_speed
+                stated = problem.with_(smallest_shape_speed=size, guess=finite.gait)
+            else:
+                stated = problem.with_(guess=None)
+                size = min(OPTIONS.min_size, stated.guess.shape_speed)
+                size = max(size, problem.smallest_shape_speed)
+                stated = stated.with_(smallest_shape_speed=size)
+            large = _follow_promising(stated, *multistart(stated, starts))
         except CollocError:
             return any_size  # nothing moves as much
+    finally:
+        run.ahead.end()
     # the first one has its size by itself, which counts for something
     enough = (1 + OPTIONS.close) * finite.objective if finite else 0.0
-    better = [each for each in large.optima if is_finite(each) and each.objective < enough]
+    better = [each for each in large.optima if is_visible(each.gait) and each.objective < enough]
     optima = sorted([*any_size.optima, *better], key=lambda optimum: optimum.objective)
-    series = [(other.value, fourier_series(problem, other.gait)) for other in any_size.others]
-    others = list(any_size.others)
-    for other in large.others:
-        here = other.value, fourier_series(problem, other.gait)
-        if not any(are_one(one, here, problem.body, problem.law) for one in series):
+    old, new = (
+        [(other.value, fourier_series(problem, other.gait)) for other in each.others]
+        for each in (any_size, large)
+    )
+    others = [*any_size.others]
+    for other, path in zip(large.others, new, strict=True):
+        if not any(are_one(one, path, problem.body, problem.law) for one in old):
             others.append(other)
     others.sort(key=lambda other: -other.value)
-    n_starts = any_size.starts + large.starts
-    return Exploration(tuple(optima), n_starts, tuple(others), any_size.left)
+    return Exploration(optima, any_size.starts + large.starts, others, any_size.left)
 
 
-def _among_large(problem: Problem, finite: Iterate | None) -> Problem:
-    """The problem among gaits as large as one of finite size; without one, as large as the default
-    guess is, or as is usual."""
-    if finite is None:
-        stated = problem.with_(guess=None)
-        size = min(OPTIONS.min_size, stated.guess.shape_speed)
-        return stated.with_(smallest_shape_speed=max(size, problem.smallest_shape_speed))
-    return problem.with_(smallest_shape_speed=finite.gait.shape_speed, guess=finite.gait)
-
-
-def _explore(
-    problem: Problem, starts: int | None, has_time: Callable[[], bool], ahead: Ahead
-) -> Exploration:
-    candidates, n_starts = multistart(problem, starts, has_time, ahead)
-    if not candidates:
-        limited = " that keeps the limits of its joints" if problem.path_limits.names else ""
-        raise NotConvergedError(
-            f"none of {n_starts} starts led to a gait of the class{limited}; give a guess."
-        )
-    ends = _follow_promising(problem, candidates, has_time, ahead)
-    distinct: list[tuple[Iterate, Candidate]] = []
-    for optimum, candidate in sorted(ends, key=lambda end: end[0].objective):
-        twin = next((led for other, led in distinct if same_gait(problem, other, optimum)), None)
-        if twin is None:
-            distinct.append((optimum, candidate))
-        else:
-            twin.starts += candidate.starts
-    left = [c for c in candidates if not any(c is followed for _, followed in ends)]
-    met = [*distinct, *((c.iterate, c) for c in left)]
-    others = (
-        Alternative(o.value, o.delta, c.starts, on_speed_floor(problem, o.gait), o.gait)
-        for o, c in met
-    )
-    return Exploration(
-        tuple(optimum for optimum, _ in distinct),
-        n_starts,
-        tuple(others),
-        tuple(c.iterate for c in left),
-    )
-
-
-def follow_rest(
-    problem: Problem, explored: Exploration, has_time: Callable[[], bool]
-) -> tuple[Iterate, ...]:
+def follow_rest(problem: Problem, explored: Exploration) -> list[Iterate]:
     """Optima at the final delta, best first, of the first of the gaits that were left."""
-    ends: list[Iterate] = []
+    ends, run = list[Iterate](), active_run()
     left = explored.left[: OPTIONS.patience]
-    for done, candidate in enumerate(itertools.takewhile(lambda _: has_time(), left)):
-        active_run().report("follow", done, len(left))
+    for done, candidate in enumerate(left):
+        if not run.has_time():
+            break
+        run.report("follow", done, len(left))
         with suppress(CollocError):
             end = follow(problem, candidate)
             known = (*explored.optima, *ends)
-            if is_member(end) and not any(same_gait(problem, end, other) for other in known):
+            is_new = not any(same_gait(problem, end, other) for other in known)
+            if end.violation <= COARSE and is_new:
                 ends.append(end)
-    return tuple(sorted(ends, key=lambda end: end.objective))
+    return sorted(ends, key=lambda end: end.objective)
 
 
-def starting_gaits(problem: Problem, seed: int = 0) -> Iterator[AnyGait]:
+def starting_gaits(problem: Problem) -> Iterator[AnyGait]:
     """The guess, gaits known from three links and waves both ways, in turn with seeded Latin
     hypercubes, which have no end."""
-    body, limit = problem.body, problem.joint_limit
-    ellipses = [to_body(ellipse(*ab), Chain(), body, limit) for ab in _THREE_LINK_ELLIPSES]
-    waves = [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
-    first = [
-        problem.guess,
-        *(
-            to_class(problem.gait.start_class, gait, body, limit, problem.smallest_shape_speed)
-            for gait in (*ellipses, *waves)
-        ),
+    body, limit, least = problem.body, problem.joint_limit, problem.smallest_shape_speed
+    # the two best ellipses of three equal links under isotropic friction: without them one harmonic
+    # of other bodies is missed at times, as that of `problems/purcell.py`
+    known = [
+        to_body(ellipse(*ab), Chain(), body, limit)
+        for ab in ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
     ]
-    seeds = map(partial(latin_hypercube_gait, problem, seed), itertools.count())
+    known += [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
+    first = [problem.guess]
+    first += [to_class(problem.gait.start_class, gait, body, limit, least) for gait in known]
+    seeds = map(partial(latin_hypercube_gait, problem, 0), itertools.count())
     return itertools.chain(itertools.chain.from_iterable(zip(first, seeds, strict=False)), seeds)
 
 
@@ -263,22 +182,11 @@ def same_gait(problem: Problem, a: Iterate, b: Iterate) -> bool:
     return are_one(one, other, problem.body, problem.law)
 
 
-def is_finite(iterate: Iterate) -> bool:
-    """True if a person sees the gait move: it did not shrink."""
-    return is_visible(iterate.gait)
-
-
-def is_member(iterate: Iterate) -> bool:
-    """True for a gait about in its class; the value of others means nothing."""
-    return iterate.violation <= COARSE
-
-
-def multistart(
-    problem: Problem, starts: int | None, has_time: Callable[[], bool], ahead: Ahead
-) -> tuple[list[Candidate], int]:
+def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], int]:
     """Candidates on a coarse mesh, best first, and the number of starts, at least one."""
-    run = active_run()
+    run, ahead = active_run(), active_run().ahead
     count = starts or OPTIONS.starts * (OPTIONS.max_starts if problem.regime.froude else 1)
+    most = OPTIONS.max_starts * count
     coarse = problem.with_(intervals=min(problem.intervals, problem.usual_intervals // 2))
     # gaits are compared where friction is nearly dry
     usual = min(problem.with_(delta_start=None).delta_start, problem.delta_start)
@@ -291,107 +199,114 @@ def multistart(
         guess = evaluate_at(*space_near(coarse, problem.guess), deltas[0])
         run.report("explore", 0, count, guess)
     levels: list[list[Candidate]] = [[] for _ in deltas]
-    loops: list[Candidate] = []
+    last, loops = levels[-1], list[Candidate]()
     for loop in small_loops(problem):
         with suppress(CollocError):
-            closed = project_to_zero_rotation(coarse, loop, dry)
-            _descend_levels(coarse, closed, [dry], [loops], is_new=True)
-    gaits = _Starts(problem, levels[-1])
+            sketch(coarse, loop, True, [dry], [loops])
+    new_gaits, drawn, n_new = starting_gaits(problem), list[AnyGait | None](), 0
     tried, improved, best, begin = 0, -OPTIONS.patience, 0.0, time.monotonic()
 
+    def is_turn_of_new(start: int) -> bool:
+        return start // (OPTIONS.starts // 2) % 2 == 0
+
+    def start_gait(start: int, number: int) -> tuple[AnyGait | None, bool]:
+        """The gait of a start, if there is one, and whether it is new: the one of that number. It
+        depends on what came before alone, so more starts go wherever fewer do."""
+        if not is_turn_of_new(start) and last:
+            best_gait = min((c.iterate for c in last), key=lambda each: each.objective).gait
+            size, rng = OPTIONS.hop * 2.0 ** (start % 3 - 1), np.random.default_rng([1, start])
+            return problem.gait.start_class.perturb(best_gait, size, 1, rng), False
+        while len(drawn) <= number:
+            drawn.append(None)
+            with suppress(CollocError):
+                drawn[-1] = next(new_gaits)
+        return drawn[number], True
+
     def is_finished() -> bool:
-        n_met = min(levels[-1], key=lambda c: c.iterate.objective).n_new if levels[-1] else 0
-        sure = n_met >= max(OPTIONS.patience / 2, gaits.n_new / OPTIONS.patience)
+        n_met = min(last, key=lambda c: c.iterate.objective).n_new if last else 0
+        sure = n_met >= max(OPTIONS.patience / 2, n_new / OPTIONS.patience)
         enough = tried >= count or (sure and not starts and 4 * tried >= count)
         if enough and tried > improved + OPTIONS.patience:
             return True
         # joints so weak that no gait keeps their limits, as it seems
-        nothing = tried >= OPTIONS.patience and not levels[-1] and not loops
+        nothing = tried >= OPTIONS.patience and not last and not loops
         return nothing and not starts and bool(problem.path_limits.names)
 
-    while tried == 0 or (tried < OPTIONS.max_starts * count and not is_finished() and has_time()):
+    while tried == 0 or (tried < most and not is_finished() and run.has_time()):
         ahead.begin((time.monotonic() - begin) / max(tried, 1) * (count - tried))
-        later = range(tried, min(tried + 2 * ahead.count, OPTIONS.max_starts * count))
-        for start, (gait, is_new) in gaits.peek(later):
-            if ahead.takes(start):
-                ahead.submit(sketch, coarse, gait, is_new, deltas)
-        gait, is_new = gaits.take(tried)
+        later = range(tried, min(tried + 2 * ahead.count, most))
+        numbers = n_new + np.cumsum([0, *map(is_turn_of_new, later)])
+        for start, number in zip(later, numbers, strict=False):
+            ahead.submit(start, sketch, coarse, *start_gait(start, int(number)), deltas)
+        gait, is_new = start_gait(tried, n_new)
+        n_new += is_new
         # a start that is no member of the class, or fails, is one start less
         with suppress(CollocError):
             ahead.wait_for(sketch, coarse, gait, is_new, deltas)
-            _sketch(coarse, gait, is_new, deltas, levels)
-        before, best = best, min((c.iterate.objective for c in levels[-1]), default=0.0)
+            sketch(coarse, gait, is_new, deltas, levels)
+        before, best = best, min((c.iterate.objective for c in last), default=0.0)
         if tried > 0 and best < before - SAME_VALUE * abs(before):
             improved = tried
         tried += 1
         # as a rule loops shrink further on their way down
-        shown = [*levels[-1], *loops] if problem.shrinking else levels[-1]
+        shown = [*last, *loops] if problem.shrinking else last
         run.report("explore", tried, max(tried, count), _best([c.iterate for c in shown]))
 
-    for candidate in (ends := [*levels[-1], *loops]):
-        candidate.dry_objective = objective_at(dry, candidate.iterate)
+    for candidate in (ends := [*last, *loops]):
+        dry_program = ReducedProgram(candidate.iterate.space, dry)
+        objective = dry_program.objective(candidate.iterate.v)
+        candidate.dry_objective = float(np.nan_to_num(objective, nan=np.inf))
         candidate.is_loop = candidate in loops
     return sorted(ends, key=lambda c: c.dry_objective), tried
 
 
-class _Starts:
-    """Starts by number: sixteen new gaits take turns with as many hops from the best candidate.
-
-    A start depends on what came before it alone: more starts go wherever fewer do.
-    """
-
-    def __init__(self, problem: Problem, candidates: list[Candidate]) -> None:
-        self._problem, self._candidates = problem, candidates
-        self._gaits, self._drawn = starting_gaits(problem), list[AnyGait | None]()
-        self.n_new = 0
-
-    def take(self, start: int) -> tuple[AnyGait | None, bool]:
-        """The gait of a start, if there is one, and whether it is new."""
-        gait, is_new = self._start(start, self.n_new)
-        self.n_new += is_new
-        return gait, is_new
-
-    def peek(self, starts: range) -> Iterator[tuple[int, tuple[AnyGait | None, bool]]]:
-        """The starts of some numbers as they are from what is known now."""
-        numbers = self.n_new + np.cumsum([0, *map(_is_turn_of_new, starts)])
-        for start, number in zip(starts, numbers, strict=False):
-            yield start, self._start(start, int(number))
-
-    def _start(self, start: int, number: int) -> tuple[AnyGait | None, bool]:
-        if not _is_turn_of_new(start) and self._candidates:
-            best = min((c.iterate for c in self._candidates), key=lambda each: each.objective)
-            size = OPTIONS.hop * 2.0 ** (start % 3 - 1)
-            rng = np.random.default_rng([1, start])
-            return self._problem.gait.start_class.perturb(best.gait, size, 1, rng), False
-        while len(self._drawn) <= number:
-            self._drawn.append(None)
-            with suppress(CollocError):
-                self._drawn[-1] = next(self._gaits)
-        return self._drawn[number], True
-
-
-def _is_turn_of_new(start: int) -> bool:
-    return start // (OPTIONS.starts // 2) % 2 == 0
-
-
-def objective_at(delta: float, iterate: Iterate) -> float:
-    """Objective of the gait at another delta; inf where there is no motion."""
-    objective = ReducedProgram(iterate.space, delta).objective(iterate.v)
-    return float(np.nan_to_num(objective, nan=np.inf))
-
-
 def _best(iterates: Sequence[Iterate]) -> Iterate | None:
     """The best that may be the answer: of finite size, unless the problem asks for any."""
-    return min(
-        (each for each in iterates if each.problem.shrinking or is_finite(each)),
-        key=lambda each: each.objective,
-        default=None,
-    )
+    fit = (each for each in iterates if each.problem.shrinking or is_visible(each.gait))
+    return min(fit, key=lambda each: each.objective, default=None)
 
 
-def sketch(coarse: Problem, gait: AnyGait, is_new: bool, deltas: list[float]) -> None:
-    """Compute a start ahead, as far as it meets no gait that this process has met."""
-    _sketch(coarse, gait, is_new, deltas, _levels_here(coarse.smallest_shape_speed, *deltas))
+def sketch(
+    coarse: Problem,
+    gait: AnyGait | None,
+    is_new: bool,
+    deltas: list[float],
+    levels: list[list[Candidate]] | None = None,
+) -> None:
+    """Optimise a start at one delta after another, a hop at the last, until it meets a known
+    candidate of a level; add those that are not known. By default those that this process met
+    ahead are known."""
+    if gait is None:
+        return
+    if levels is None:
+        levels = _levels_here(coarse.smallest_shape_speed, *deltas)
+    if is_new:
+        gait = project_to_zero_rotation(coarse, gait, deltas[0])
+    else:
+        deltas, levels = deltas[-1:], levels[-1:]
+    space, v = space_near(coarse, gait)
+    before: Candidate | None = None
+    for delta, known in zip(deltas, levels, strict=True):
+        iterate = optimise(space, v, delta, COARSE)
+        if regularisation_dominated(iterate):
+            continue  # as far as this delta goes, the start is as it was
+        space, v = iterate.space, iterate.v
+        if not iterate.violation <= COARSE:
+            continue  # no member of the class
+        met = next((c for c in known if same_gait(coarse, c.iterate, iterate)), None)
+        candidate = met or Candidate(iterate)
+        if met is None:
+            known.append(candidate)
+        if before is not None:
+            before.next = candidate
+        each: Candidate | None = candidate
+        while each is not None:
+            each.starts += 1
+            each.n_new += is_new
+            each = each.next
+        if met is not None:
+            return
+        before = candidate
 
 
 @lru_cache(maxsize=1)
@@ -399,60 +314,18 @@ def _levels_here(smallest: float, *deltas: float) -> list[list[Candidate]]:
     return [[] for _ in deltas]
 
 
-def _sketch(
-    coarse: Problem,
-    gait: AnyGait | None,
-    is_new: bool,
-    deltas: list[float],
-    levels: list[list[Candidate]],
-) -> None:
-    """Optimise a new start at all deltas, a hop at the last."""
-    if is_new and gait is not None:
-        closed = project_to_zero_rotation(coarse, gait, deltas[0])
-        _descend_levels(coarse, closed, deltas, levels, is_new=True)
-    elif gait is not None:
-        _descend_levels(coarse, gait, deltas[-1:], levels[-1:], is_new=False)
-
-
-def _descend_levels(
-    problem: Problem,
-    gait: AnyGait,
-    deltas: list[float],
-    levels: list[list[Candidate]],
-    *,
-    is_new: bool,
-) -> None:
-    """Optimise a start at one delta after another until it meets a known candidate; add those that
-    are not known."""
-    space, v = space_near(problem, gait)
-    before = None
-    for delta, known in zip(deltas, levels, strict=True):
-        iterate = optimise(space, v, delta, COARSE)
-        if regularisation_dominated(iterate):
-            continue  # as far as this delta goes, the start is as it was
-        space, v = iterate.space, iterate.v
-        if not is_member(iterate):
-            continue
-        met = next((c for c in known if same_gait(problem, c.iterate, iterate)), None)
-        candidate = met or Candidate(iterate)
-        if met is None:
-            known.append(candidate)
-        if before is not None:
-            before.next = candidate
-        candidate.count_start(is_new=is_new)
-        if met is not None:
-            return
-        before = candidate
-
-
-def _follow_promising(
-    problem: Problem, candidates: list[Candidate], has_time: Callable[[], bool], ahead: Ahead
-) -> list[tuple[Iterate, Candidate]]:
-    """Promising candidates at the final delta, those close to the best on the whole mesh.
+def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int) -> Exploration:
+    """Distinct optima of promising candidates at the final delta, those close to the best on the
+    whole mesh.
 
     Gaits of finite size may shrink on the way, so they are followed until one has not.
     """
-    ends, left = list[tuple[Iterate, Candidate]](), list(candidates)
+    if not candidates:
+        limited = " that keeps the limits of its joints" if problem.path_limits.names else ""
+        raise NotConvergedError(
+            f"none of {starts} starts led to a gait of the class{limited}; give a guess."
+        )
+    ends, left, run = list[tuple[Iterate, Candidate]](), list(candidates), active_run()
 
     def is_promising(candidate: Candidate) -> bool:
         # by what the best one promises, or has come to where it promised too much
@@ -462,16 +335,16 @@ def _follow_promising(
 
     def report() -> None:
         best = _best([optimum for optimum, _ in ends]) or _best([c.iterate for c in left])
-        active_run().report("follow", len(candidates) - len(left), len(candidates), best)
+        run.report("follow", len(candidates) - len(left), len(candidates), best)
 
     def add(candidate: Candidate) -> bool:
         """Follow a candidate to its end; return whether that is a new gait."""
         is_new = False
         left.remove(candidate)
-        ahead.wait_for(follow, problem, candidate.iterate)
+        run.ahead.wait_for(follow, problem, candidate.iterate)
         with suppress(CollocError):
             end = follow(problem, candidate.iterate)
-            if is_member(end):
+            if end.violation <= COARSE:
                 is_new = not any(same_gait(problem, end, other) for other, _ in ends)
                 ends.append((end, candidate))
         report()
@@ -481,16 +354,15 @@ def _follow_promising(
     queues = [[c for c in candidates if c.is_loop == is_loop] for is_loop in (False, True)]
     first = itertools.chain(*(queue[: OPTIONS.followed] for queue in queues))
     for number, candidate in enumerate(filter(is_promising, first)):
-        if ahead.takes(number):
-            ahead.submit(follow, problem, candidate.iterate)
+        run.ahead.submit(number, follow, problem, candidate.iterate)
     for queue in queues:
         n_new = 0  # candidates that differ may come to one gait
         for candidate in queue[: OPTIONS.patience]:
             wanted = n_new < OPTIONS.followed and is_promising(candidate)
-            if wanted and (has_time() or not ends):
+            if wanted and (run.has_time() or not ends):
                 n_new += add(candidate)
-    for candidate in [c for c in left if is_finite(c.iterate)][: OPTIONS.patience]:
-        if any(is_finite(optimum) for optimum, _ in ends) or (ends and not has_time()):
+    for candidate in [c for c in left if is_visible(c.iterate.gait)][: OPTIONS.patience]:
+        if any(is_visible(optimum.gait) for optimum, _ in ends) or (ends and not run.has_time()):
             break
         add(candidate)
     if not ends:
@@ -498,21 +370,32 @@ def _follow_promising(
             "no gait could be followed to the final delta; start at a larger delta or give another "
             "guess."
         )
-    best = min(optimum.objective for optimum, _ in ends)
-    best_finite = min((optimum.objective for optimum, _ in ends if is_finite(optimum)), default=0.0)
-    close, close_finite = (1 - OPTIONS.close) * best, (1 - OPTIONS.close) * best_finite
+    close = (1 - OPTIONS.close) * min(optimum.objective for optimum, _ in ends)
+    finite = [optimum.objective for optimum, _ in ends if is_visible(optimum.gait)]
+    close_finite = max(close, (1 - OPTIONS.close) * min(finite, default=0.0))
     for k, (optimum, candidate) in enumerate(ends):
-        if optimum.objective <= (max(close, close_finite) if is_finite(optimum) else close):
+        if optimum.objective <= (close_finite if is_visible(optimum.gait) else close):
             with suppress(CollocError):
                 whole = optimise(*space_near(problem, optimum.gait), optimum.delta, MEDIUM)
                 ends[k] = whole.after(optimum.history), candidate
-    return ends
+    distinct: list[tuple[Iterate, Candidate]] = []
+    for optimum, candidate in sorted(ends, key=lambda end: end[0].objective):
+        twin = next((led for other, led in distinct if same_gait(problem, other, optimum)), None)
+        if twin is None:
+            distinct.append((optimum, candidate))
+        else:
+            twin.starts += candidate.starts
+    left = [c for c in candidates if not any(c is followed for _, followed in ends)]
+    others = [
+        Alternative(o.value, o.delta, c.starts, on_speed_floor(problem, o.gait), o.gait)
+        for o, c in [*distinct, *((c.iterate, c) for c in left)]
+    ]
+    return Exploration([o for o, _ in distinct], starts, others, [c.iterate for c in left])
 
 
 def follow(problem: Problem, iterate: Iterate) -> Iterate:
     """The gait at the final delta, on a mesh of half the interval."""
     edges = iterate.space.mesh.edges
-    finer = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
-    space = space_of(problem, None, finer)
+    space = space_of(problem, np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])])))
     v = space.parameters(iterate.gait)
     return descend(optimise(space, v, iterate.delta, MEDIUM))

@@ -1,4 +1,5 @@
-"""IPOPT on a full program, and first-order conditions measured at what it returns."""
+"""IPOPT on a full program, first-order conditions measured at what it returns, and why a solve
+failed: which equation, which link, which time window, and what to try."""
 
 from __future__ import annotations
 
@@ -11,12 +12,15 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.numerics.multiplier_estimate import least_squares_multipliers
+from colloc.numerics.multiplier_estimate import (
+    least_squares_multipliers,
+    quasi_definite_factors,
+)
 from colloc.numerics.repeated import as_sparse
 from colloc.numerics.sqp import keep_last
 from colloc.search.options import TOLERANCES
 from colloc.system.interruption import interrupted, interruptible
-from colloc.transcription.full_program import FullProgram
+from colloc.transcription.full_program import ACTUATORS, FullProgram
 
 _PUSHED = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
 IPOPT_OPTIONS: dict[str, object] = {
@@ -31,18 +35,11 @@ IPOPT_OPTIONS: dict[str, object] = {
     **dict.fromkeys([*_PUSHED[:2], *(f"warm_start_{name}" for name in _PUSHED)], 1e-5),
     "max_iter": 60,
 }
-LIFTED_OPTIONS: dict[str, object] = {
-    "theta_max_fact": 0.1,
-    "constr_viol_tol": 1e-11,
-    "max_iter": 300,
-}
-"""theta_max_fact keeps the iterates near the balance manifold, from which a step along negative
-curvature would carry them away for good, at up to 120 short steps a level; the velocity map needs
-none. A violated row moves the balance of a point by up to 1 / delta as much, of which a certificate
-allows 1e-6."""
-CONFIRMING: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}
-"""The barrier begins where it ends, as multipliers are known: one to four steps confirm most gaits,
-and more than 30 lead away."""
+# theta_max_fact keeps the iterates near the balance manifold, from which a step along negative
+# curvature would carry them away for good, at up to 120 short steps a level; the velocity map needs
+# none. A violated row moves the balance of a point by up to 1 / delta as much, of which a
+# certificate allows 1e-6
+LIFTED_OPTIONS = {"theta_max_fact": 0.1, "constr_viol_tol": 1e-11, "max_iter": 300}
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,37 +50,22 @@ class NlpResult:
     lam_x: np.ndarray  # (n,)
     lam_g: np.ndarray  # (m,)
     objective: float
-    kkt_error: float
-    """Largest component of the Lagrangian's gradient, unscaled."""
+    kkt_error: float  # largest component of the Lagrangian's gradient, unscaled
     violation: float
     complementarity: float
-    status: str
-    """IPOPT's word, no verdict."""
+    status: str  # IPOPT's word, no verdict
     iterations: int
     seconds: float
-    evaluation_seconds: float
-    """Seconds in functions and derivatives."""
-    excess: np.ndarray
-    """Violation of each constraint, ``(m,)``."""
+    excess: np.ndarray  # violation of each constraint, (m,)
 
     def accumulate(self, earlier: NlpResult) -> NlpResult:
         """This result with the iterations and seconds of an earlier solve added."""
-        return replace(
-            self,
-            iterations=self.iterations + earlier.iterations,
-            seconds=self.seconds + earlier.seconds,
-            evaluation_seconds=self.evaluation_seconds + earlier.evaluation_seconds,
-        )
+        iterations, seconds = self.iterations + earlier.iterations, self.seconds + earlier.seconds
+        return replace(self, iterations=iterations, seconds=seconds)
 
     @property
     def optimal(self) -> bool:
         return max(self.kkt_error, self.violation, self.complementarity) < TOLERANCES.kkt
-
-
-_REGIONS = 20
-"""Successive trust regions at most: gaits of three joints go 2 rad and more."""
-_INSIDE = 0.999
-"""Part of the radius from which a point counts as on the edge: the barrier keeps off it."""
 
 
 class Solver:
@@ -93,19 +75,24 @@ class Solver:
         self.program, self._nlp = program, program.nlp
         lifted = LIFTED_OPTIONS if program.layout.friction.size else {}
         chosen = {**IPOPT_OPTIONS, **lifted, **(options or {})}
-        settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
-        settings |= dict.fromkeys(
-            ("print_time", "calc_lam_p", "calc_lam_x", "calc_f", "calc_g"), False
-        )
-        settings |= {"error_on_fail": False, "no_nlp_grad": True, "record_time": True}
+        self._settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
+        off = ("print_time", "calc_lam_p", "calc_lam_x", "calc_f", "calc_g", "error_on_fail")
+        self._settings |= dict.fromkeys(off, False) | {"no_nlp_grad": True, "record_time": True}
         # held here: CasADi does not keep it alive
         self._stop = StopRequest(self._nlp.expressions)
-        self._settings = settings | {**self._nlp.functions, "iteration_callback": self._stop}
+        self._settings |= {**self._nlp.functions, "iteration_callback": self._stop}
         self._values_and_slopes = keep_last(self._evaluate)
 
     @cached_property
     def _solver(self) -> ca.Function:
         return ca.nlpsol("colloc", "ipopt", self._nlp.expressions, self._settings)
+
+    def _evaluate(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
+        """Objective, gradient ``(n,)``, rows ``(m,)`` and Jacobian ``(m, n)`` at ``(x, delta)``."""
+        x, delta = at[:-1], at[-1] / self.program.delta_unit
+        f, gradient = self._nlp.functions["grad_f"](x, delta)
+        g, jacobian = self._nlp.functions["jac_g"](x, delta)
+        return float(f), gradient.full().ravel(), g.full().ravel(), as_sparse(jacobian)
 
     def solve_within(
         self,
@@ -118,41 +105,36 @@ class Solver:
         parameter, at delta per period; `multipliers` (lam_x, lam_g) are those closest to
         stationarity by default."""
         t = self.program
-        own = t.layout.parameters[:, 0]
-        lower, upper = t.lower.copy(), t.upper.copy()
-        lower[own], upper[own] = (
-            np.maximum(lower[own], x[own] - radius),
-            np.minimum(upper[own], x[own] + radius),
-        )
-        limits = {"lbx": lower, "ubx": upper, "lbg": t.row_lower, "ubg": t.row_upper}
+        own, lower, upper = t.layout.parameters[:, 0], t.lower.copy(), t.upper.copy()
+        lower[own] = np.maximum(lower[own], x[own] - radius)
+        upper[own] = np.minimum(upper[own], x[own] + radius)
         lam_x, lam_g = multipliers or self._complete(
             x, delta, np.zeros_like(x), np.zeros_like(t.row_lower)
         )
-        duals = {"lam_x0": lam_x, "lam_g0": lam_g}
         start = time.perf_counter()
         with interruptible():
-            solution = self._solver(x0=x, p=delta / self.program.delta_unit, **limits, **duals)
-        seconds = time.perf_counter() - start
-        stats = self._solver.stats()
+            solution = self._solver(
+                x0=x,
+                p=delta / t.delta_unit,
+                lbx=lower,
+                ubx=upper,
+                lbg=t.row_lower,
+                ubg=t.row_upper,
+                lam_x0=lam_x,
+                lam_g0=lam_g,
+            )
+        seconds, stats = time.perf_counter() - start, self._solver.stats()
         x, lam_x, lam_g = (np.array(solution[k]).ravel() for k in ("x", "lam_x", "lam_g"))
-        return self._result(x, lam_x, lam_g, delta, (lower, upper), stats, seconds)
-
-    def _evaluate(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
-        """Objective, gradient ``(n,)``, rows ``(m,)`` and Jacobian ``(m, n)`` at ``(x, delta)``."""
-        x, delta = at[:-1], at[-1] / self.program.delta_unit
-        f, gradient = self._nlp.functions["grad_f"](x, delta)
-        g, jacobian = self._nlp.functions["jac_g"](x, delta)
-        return float(f), gradient.full().ravel(), g.full().ravel(), as_sparse(jacobian)
+        ended = stats["return_status"], int(stats["iter_count"]), seconds
+        return self._result(x, lam_x, lam_g, delta, lower, upper, ended)
 
     def measured(
         self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
     ) -> NlpResult:
         """First-order conditions at x ``(n,)``, from multipliers of bounds and inequalities; those
         of the equations are the ones closest to stationarity."""
-        multipliers = self._complete(x, delta, lam_x, lam_g)
-        bounds = self.program.lower, self.program.upper
-        nothing = {"return_status": "measured", "iter_count": 0}
-        return self._result(x, *multipliers, delta, bounds, nothing, 0.0)
+        multipliers, t = self._complete(x, delta, lam_x, lam_g), self.program
+        return self._result(x, *multipliers, delta, t.lower, t.upper, ("measured", 0, 0.0))
 
     def _complete(
         self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
@@ -160,11 +142,11 @@ class Solver:
         """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's
         gradient."""
         t = self.program
-        free, equality = t.lower < t.upper, np.flatnonzero(t.row_lower == t.row_upper)
-        _, gradient, _, jacobian = self._values_and_slopes(np.append(x, delta))
+        _, gradient, _, slopes = self._values_and_slopes(np.append(x, delta))
         lam_g = np.where(t.row_lower == t.row_upper, 0.0, lam_g)
-        gradient = gradient + jacobian.T @ lam_g + lam_x
-        lam_g[equality] = least_squares_multipliers(jacobian[equality][:, free], gradient[free])
+        gradient = gradient + slopes.T @ lam_g + lam_x
+        jacobian, equality = self.equality_jacobian(x, delta)
+        lam_g[equality] = least_squares_multipliers(jacobian, gradient[t.lower < t.upper])
         return lam_x, lam_g
 
     def equality_jacobian(
@@ -182,36 +164,27 @@ class Solver:
         lam_x: np.ndarray,
         lam_g: np.ndarray,
         delta: float,
-        bounds: tuple[np.ndarray, np.ndarray],
-        stats: dict,
-        seconds: float,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        ended: tuple[str, int, float],
     ) -> NlpResult:
-        t = self.program
-        lower, upper = bounds
+        t, free = self.program, self.program.lower < self.program.upper
         f, gradient, g, jacobian = self._values_and_slopes(np.append(x, delta))
-        free = t.lower < t.upper
         stationarity = gradient + jacobian.T @ lam_g + lam_x
         outside = np.maximum(np.maximum(t.row_lower - g, g - t.row_upper), 0.0)
         bounds_outside = np.maximum(np.maximum(lower - x, x - upper), 0.0)
-        products = [
-            _complementarity(lam_x[free], x[free], lower[free], upper[free]),
-            _complementarity(lam_g, g, t.row_lower, t.row_upper),
-        ]
-        evaluation = sum(v for k, v in stats.items() if k.startswith("t_wall_nlp_"))
-        return NlpResult(
-            x,
-            lam_x,
-            lam_g,
-            f,
-            float(np.abs(stationarity[free]).max()),
-            float(max(outside.max(), bounds_outside.max())),
-            max(products),
-            stats["return_status"],
-            int(stats["iter_count"]),
-            seconds,
-            float(evaluation),
-            outside,
-        )
+        products = []
+        for multiplier, value, low, high in (
+            (lam_x[free], x[free], lower[free], upper[free]),
+            (lam_g, g, t.row_lower, t.row_upper),
+        ):
+            # of inequalities; the multiplier alone where the bound is infinite
+            distance = np.where(multiplier > 0, high - value, value - low)
+            distance = np.where(np.isinf(distance), 1.0, np.abs(distance))
+            products.append((np.abs(multiplier) * distance)[low < high].max(initial=0.0))
+        kkt_error = float(np.abs(stationarity[free]).max())
+        errors = kkt_error, float(max(outside.max(), bounds_outside.max())), float(max(products))
+        return NlpResult(x, lam_x, lam_g, f, *errors, *ended, outside)
 
 
 def solve_in_regions(
@@ -222,29 +195,19 @@ def solve_in_regions(
     options: dict[str, object] | None = None,
 ) -> tuple[FullProgram, NlpResult]:
     """Optimum of successive trust regions, each about the last one's end, with shape limits at the
-    worst instants there; and the program of the last region."""
+    worst instants there; and the program of the last region. There are at most twenty: gaits of
+    three joints go 2 rad and more."""
     result: NlpResult | None = None
     p = program.layout.parameters[:, 0]
-    for _ in range(_REGIONS):
+    for _ in range(20):
         last = Solver(program, options).solve_within(x, delta, None, radius)
         result = last if result is None else last.accumulate(result)
-        if not result.optimal or np.abs(result.x[p] - x[p]).max() < _INSIDE * radius:
+        # the barrier keeps off the edge of the region
+        if not result.optimal or np.abs(result.x[p] - x[p]).max() < 0.999 * radius:
             return program, result
         program, x = program.moved_to(result.x)
     assert result is not None
     return program, replace(result, complementarity=np.inf, status="still moving")
-
-
-def _complementarity(
-    multiplier: np.ndarray, value: np.ndarray, lower: np.ndarray, upper: np.ndarray
-) -> float:
-    """Largest |multiplier| x distance to its bound, of inequalities; |multiplier| where that
-    is infinite."""
-    inequality = lower < upper
-    distance = np.where(multiplier > 0, upper - value, value - lower)
-    with np.errstate(invalid="ignore"):
-        product = np.where(np.isinf(distance), np.abs(multiplier), np.abs(multiplier * distance))
-    return float(product[inequality].max(initial=0.0))
 
 
 class StopRequest(ca.Callback):
@@ -268,3 +231,128 @@ class StopRequest(ca.Callback):
 
     def eval(self, arguments: list[ca.DM]) -> list[int]:
         return [int(interrupted())]
+
+
+_MEANING = {
+    "tail": "the direction of the tail",
+    **dict.fromkeys(("velocity x", "velocity y"), "the joining of links"),
+    **dict.fromkeys(("force x", "force y"), "the balance of forces"),
+    "torque": "the balance of torques",
+    "balance": "the balance of the body",
+    "force law": "the law of friction",
+    "rotation": "closure of the net rotation",
+    "orientation": "the rotation between nodes",
+    "distance": "the distance gained over an interval",
+    "work": "the work gained over an interval",
+    "at least": "a value that has to be reached",
+    "shape speed": "the lower bound on the shape speed",
+    "heading": "where the body points at the start",
+    "across": "the way across the direction that was asked for",
+}
+_BALANCE = ("tail", "velocity", "force", "torque", "balance")
+_ADVICE = {
+    _BALANCE: "start the continuation at a larger delta_start, use more intervals, or another "
+    "formulation",
+    (ACTUATORS,): "allow the joints more, take other links, or start from another guess",
+    ("at least",): "ask for less, or start from a guess that reaches it",
+    ("rotation",): "start from a guess with less net rotation, or impose a symmetry that closes it",
+    ("joint", "links", "tangent"): "start from a guess of smaller amplitude",
+    ("",): "use more intervals or another guess",
+}
+
+
+def row_meaning(program: FullProgram, row: int) -> tuple[str, float]:
+    """Meaning of a constraint row, and its phase."""
+    name = _group(program, row)
+    rows, mesh = program.groups[name], program.mesh
+    index, count = row - rows.start, rows.stop - rows.start
+    body, aims = program.control.dynamics.body, program.control.aims
+    if name == ACTUATORS:
+        point, which = divmod(index, len(program.control.actuators.names))
+        limit = program.control.actuators.names[which]
+        return f"the limit on the {limit}", float(mesh.times[point])
+    if name == "rotation":
+        return "closure of the net rotation", float(mesh.edges[-1])
+    if name in program.cells:
+        what = "contact of" if name.startswith("links") else "the limit of"
+        what = what if name.startswith("links") or name in body.bounded_angles.names else "the"
+        return f"{what} {name}", float(mesh.edges[program.cells[name][index]])
+    integrals = {each.name: f"the {each.meaning or each.name}" for each in aims.integrals}
+    what = integrals.get(name) or _MEANING.get(name.rstrip(" 0123456789"), f"the {name}")
+    if name in ("angles", "rates"):
+        joint = f"{body.defaults.coordinate} {index // mesh.n_point + 1}"
+        what = f"the {name[:-1]} of {joint} against its gait"
+    elif name == "rotation":
+        return what, float(mesh.edges[-1])
+    elif name in integrals or name in ("at least", "shape speed", "heading", "across"):
+        return what, 0.0
+    if count % mesh.n_point == 0:  # rows of points, part by part
+        return what, float(mesh.times[index % mesh.n_point])
+    return what, float(mesh.edges[index * mesh.n // count])
+
+
+def _group(program: FullProgram, row: int) -> str:
+    return next(name for name, s in program.groups.items() if s.start <= row < s.stop)
+
+
+def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
+    """Sentences on the worst violated row, and what to try next."""
+    worst = int(np.argmax(result.excess))
+    excess = result.excess[worst]
+    if excess > TOLERANCES.violation:
+        (what, when), group = row_meaning(program, worst), _group(program, worst)
+        rows = program.groups[group]
+        bad = rows.start + np.flatnonzero(result.excess[rows] >= 0.1 * excess)
+        phases = [row_meaning(program, int(row))[1] for row in bad]
+        window = f"at phase {when:.3f}"
+        if min(phases) < max(phases):
+            window = f"between phases {min(phases):.3f} and {max(phases):.3f}, worst at {when:.3f}"
+        failed = f"{what} is off by {excess:.1e} {window}"
+        if group == ACTUATORS:
+            limits = program.control.problem.path_limits
+            each = [
+                (limit.function, most) for limit in limits.each for most in np.ravel(limit.most)
+            ]
+            function, most = each[(worst - rows.start) % len(limits.names)]
+            units = {"moment": " weight x body length", "power": " weight x body length per period"}
+            failed = f"{what} is {most:g}{units.get(function, '')}, and the gait takes "
+            failed += f"{1 + excess:.4g} times as much {window}"
+        advice = next(text for names, text in _ADVICE.items() if group.startswith(names))
+    elif result.status == "still moving":
+        failed = "the gait kept moving from trust region to trust region"
+        advice = "start from a better guess"
+    else:
+        what = program.control.aims.objective.name
+        failed = (
+            f"every equation holds, but the {what} is not stationary (KKT error "
+            f"{result.kkt_error:.1e})"
+        )
+        advice = (
+            "use more intervals, since kinks at stick may be under-resolved, or start from "
+            "another guess"
+        )
+        # links at stick move at the order of delta, tail velocities resolve 1e-16, so the gradient
+        # is known to 1e-16/delta: KKT errors of 1.8e-8 at 1e-8, 1.3e-7 at 1e-9, 2e-6 at 1e-10 were
+        # measured on one harmonic of three links
+        if delta < 1e-9:
+            advice = "ask for a delta of at least 1e-09, below which rounding hides the optimum"
+    effort = f"not converged at delta = {delta:.1e} after {result.iterations} iterations"
+    return f"{effort}: {failed} ({result.status}). Try to {advice}."
+
+
+def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str]:
+    """Names of equations that are (nearly) linear combinations of others at x ``(n,)``."""
+    jacobian, equality = solver.equality_jacobian(x, delta)
+    scale = np.sqrt(np.asarray(jacobian.multiply(jacobian).sum(axis=1)).ravel())
+    rows = (sparse.diags(1.0 / np.maximum(scale, 1e-300)) @ jacobian).tocsr()
+    # inverse iteration on rows rows' + eps: the combination of the rows that nearly vanishes
+    factors, n = quasi_definite_factors(rows), rows.shape[1]
+    combination = np.random.default_rng(0).normal(size=equality.size)
+    for _ in range(2):
+        combination = factors.solve(np.concatenate([np.zeros(n), -combination]))[n:]
+        combination /= np.linalg.norm(combination)
+    # the eigenvalue: n intervals that sum up distance have 1.2 / n^2, redundant rows 1e-18
+    if np.linalg.norm(rows.T @ combination) ** 2 > 1e-12:
+        return []
+    suspicious = equality[np.abs(combination) > 0.1 * np.abs(combination).max()]
+    return sorted({_group(solver.program, int(row)) for row in suspicious})

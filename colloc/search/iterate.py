@@ -1,5 +1,5 @@
 """The value that the stages of a search hand on: a gait that is optimal in its class at one delta
-on one mesh, or nearly."""
+on one mesh, or nearly; and the spaces in which such gaits are searched."""
 
 from __future__ import annotations
 
@@ -8,62 +8,41 @@ from functools import cached_property
 
 import numpy as np
 
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
+from colloc.mechanics.contact import Pairs
 from colloc.numerics.sqp import Stationarity, stationarity
+from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import Step
 from colloc.search.options import MEDIUM, TOLERANCES
 
 STATIONARY, NOT_STATIONARY = "stationary", "not stationary"
+SPACES = LinearSpace, SearchSpace
 
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """A gait with its first-order conditions.
+    """A gait with its first-order conditions."""
 
-    Attributes
-    ----------
-    space : SearchSpace
-        The class of gaits on a mesh; its problem has the body's panels of this iterate.
-    v : (n,)
-        Parameters in that space.
-    delta : float
-        In the units of the class of gaits.
-    objective : float
-        What SQP minimises: minus the value, in units of the friction.
-    kkt_error, violation, complementarity : float
-    kkt : float
-        Tolerance of the KKT error that was asked for.
-    hessian : (n, n), optional
-        Quasi-Newton estimate of the Lagrangian's second derivatives.
-    on_kink : bool
-        Whether the conditions hold for gradients sampled around v, not at v.
-    message : str
-        What refinement could not reach.
-    history : tuple of Step
-        Iterates that led here, this one last.
-    """
-
-    space: SearchSpace
-    v: np.ndarray
-    delta: float
-    objective: float
+    space: SearchSpace  # its problem has the body's panels of this iterate
+    v: np.ndarray  # parameters in that space, (n,)
+    delta: float  # in the units of the class of gaits
+    objective: float  # what SQP minimises: minus the value, in units of the friction
     kkt_error: float
     violation: float
     complementarity: float
-    kkt: float
-    hessian: np.ndarray | None = None
-    on_kink: bool = False
-    message: str = ""
-    history: tuple[Step, ...] = ()
+    kkt: float  # tolerance of the KKT error that was asked for
+    hessian: np.ndarray | None = None  # quasi-Newton estimate for the Lagrangian, (n, n)
+    on_kink: bool = False  # whether the conditions hold for gradients sampled around v, not at v
+    message: str = ""  # what refinement could not reach
+    history: tuple[Step, ...] = ()  # iterates that led here, this one last
 
     def __repr__(self) -> str:
-        verdict = "" if self.optimal else ", not stationary"
-        return (
-            f"<Iterate {self.value:.6g} at delta = {self.delta:.1e}, {self.step.intervals} "
-            f"intervals{verdict}>"
-        )
+        size = f"{self.step.intervals} intervals{'' if self.optimal else ', not stationary'}"
+        return f"<Iterate {self.value:.6g} at delta = {self.delta:.1e}, {size}>"
 
     @property
     def problem(self) -> Problem:
@@ -97,42 +76,56 @@ class Iterate:
         return replace(self, history=(*history, self.step))
 
 
-def iterate_at(
-    program: ReducedProgram,
+def evaluate_at(
+    space: SearchSpace,
     v: np.ndarray,
-    kkt: float,
-    conditions: Stationarity,
+    delta: float,
+    kkt: float = MEDIUM,
+    program: ReducedProgram | None = None,
+    conditions: Stationarity | None = None,
     *,
     iterations: int = 0,
     seconds: float = 0.0,
     hessian: np.ndarray | None = None,
 ) -> Iterate:
-    """Iterate of a program whose rows are placed, with known first-order conditions."""
+    """Iterate at given parameters, with its program (rows placed) and conditions if known."""
+    if program is None:
+        program = ReducedProgram(space, delta)
+        program.place_rows(v)
+    conditions = conditions or stationarity(program, v)
     objective, period = program.objective(v), program.period(v)
     stationary = max(conditions.kkt_error, conditions.complementarity) < kkt
     step = Step(
-        program.delta,
-        program.space.mesh.n,
+        delta,
+        space.mesh.n,
         *(program.stated(objective), period["distance"], period["work"], conditions.kkt_error),
         optimal=stationary,
         status=STATIONARY if stationary else NOT_STATIONARY,
         iterations=iterations,
         seconds=seconds,
     )
-    return Iterate(
-        program.space,
-        v,
-        program.delta,
-        objective,
-        *(conditions.kkt_error, conditions.violation, conditions.complementarity),
-        kkt=kkt,
-        hessian=hessian,
-        history=(step,),
-    )
+    errors = conditions.kkt_error, conditions.violation, conditions.complementarity
+    return Iterate(space, v, delta, objective, *errors, kkt, hessian, history=(step,))
 
 
-def evaluate_at(space: SearchSpace, v: np.ndarray, delta: float) -> Iterate:
-    """Iterate at given parameters, without optimising them."""
-    program = ReducedProgram(space, delta)
-    program.place_rows(v)
-    return iterate_at(program, v, MEDIUM, stationarity(program, v))
+def space_of(
+    problem: Problem, edges: np.ndarray | None = None, scheme: str = "", far: Pairs = ()
+) -> SearchSpace:
+    """The class of a problem on a mesh, by default the first one, with pairs of links `far` kept
+    from crossing; edges in the program's own time."""
+    space: type = SearchSpace if isinstance(problem.gait, Prescribed) else LinearSpace
+    return space(control_problem(problem), edges, scheme, far)
+
+
+def space_near(
+    problem: Problem,
+    gait: AnyGait,
+    edges: np.ndarray | None = None,
+    scheme: str = "",
+    far: Pairs = (),
+) -> tuple[SearchSpace, np.ndarray]:
+    """The space of `space_of`, on edges in phases of the gait, and the parameters of its member
+    nearest to the gait."""
+    edges = None if edges is None else problem.gait.times(gait, edges)
+    space = space_of(problem, edges, scheme, far)
+    return space, space.parameters(gait)

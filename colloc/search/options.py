@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -103,3 +103,8 @@ def objective_accuracy(kkt: float) -> float:
 def max_rounds(kkt: float) -> int:
     """Subproblems of one optimisation: two a digit."""
     return 2 * round(-np.log10(kkt))
+
+
+def settings() -> dict[str, dict[str, float]]:
+    """The numbers above, as they go into a result: `Tolerances(**settings()["tolerances"])`."""
+    return {"tolerances": asdict(TOLERANCES), "options": asdict(OPTIONS)}

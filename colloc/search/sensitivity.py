@@ -12,7 +12,7 @@ knots on the same kinks err alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -29,113 +29,58 @@ from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.solution import Solution
-from colloc.search.converge import optimise
+from colloc.search.iterate import space_near, space_of
+from colloc.search.optimise import optimise
 from colloc.search.options import FINE, MEDIUM
 from colloc.search.solve import finish
-from colloc.search.spaces import on_mesh_of, space_near, space_of, with_far
 from colloc.system.errors import ProblemError
-from colloc.verification.adaptive_motion import Replay
 from colloc.verification.replay import replayer
 
 CHANGE = 0.1
-_STEP = 1e-5
-"""Relative step of differences; on three problems steps from 1e-4 to 1e-7 agree to 1e-7."""
+_STEP = 1e-5  # relative; on three problems steps from 1e-4 to 1e-7 agree to 1e-7
 _NOTHING = 1e-9  # relative slope that counts as none
-_FINEST = 8  # parts of each interval of the answer's mesh
-_STATIONARY = 1e-4
-"""Largest gradient of the Lagrangian, over the value, at which there are multipliers."""
-_EXCESS, _TURNS = 1e-5, 1e-4
-"""Excess over limits [rad, or relative] and rotation [rad] that count as none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Again:
-    """The best value where a number differs, and that of the gait on file there.
+    """The best value where a number differs, and that of the gait on file there."""
 
-    Attributes
-    ----------
-    change : float
-        Of the number.
-    value, error : float
-        Of the re-optimised gait, certified; NaN if it is not.
-    status : str
-    kept, kept_error : float
-        Of the gait on file, replayed there.
-    breaks : str
-        Limits that the gait on file does not keep there.
-    """
-
-    change: float
-    value: float
+    change: float  # of the number
+    value: float  # of the re-optimised gait, certified; NaN if it is not
     error: float
     status: str
-    kept: float
+    kept: float  # of the gait on file, replayed there
     kept_error: float
-    breaks: str
+    breaks: str  # limits that it does not keep there
 
     @property
     def behind(self) -> float:
         """Loss of the gait on file against the best one there; negative where it breaks a limit."""
         return self.value - self.kept
 
-    def facts(self) -> dict[str, Any]:
-        """Plain numbers; None for what there is not."""
-        names = ("change", "value", "error", "kept", "kept_error", "behind")
-        numbers = {name: float(getattr(self, name)) for name in names}
-        finite = {name: x if np.isfinite(x) else None for name, x in numbers.items()}
-        return finite | {"status": self.status, "breaks": self.breaks}
-
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """Effect of one number of a problem on the best value.
-
-    Attributes
-    ----------
-    name : str
-    now : float
-        The number.
-    relative : bool
-        Whether changes are parts of the number, or of a link for places of feet.
-    slope : float
-        Derivative of the best value along that change; one-sided where the number can only become
-        smaller.
-    error : float
-        Change of the slope on other meshes and with twice the step.
-    sides : tuple of int
-        Whether the number can be smaller (-1) and larger (1).
-    again : tuple of Again
-    """
+    """Effect of one number of a problem on the best value."""
 
     name: str
-    now: float
-    relative: bool
-    slope: float
-    error: float
-    sides: tuple[int, ...] = (-1, 1)
+    now: float  # the number
+    relative: bool  # whether changes are parts of the number, or of a link for places of feet
+    slope: float  # derivative of the best value; one-sided where the number can only be smaller
+    error: float  # change of the slope on other meshes and with twice the step
+    sides: tuple[int, ...] = (-1, 1)  # whether the number can be smaller (-1) and larger (1)
     again: tuple[Again, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """Effects of the numbers of a problem on its best value.
-
-    Attributes
-    ----------
-    name, objective : str
-    value, error : float
-        As certified.
-    effects : tuple of Effect
-    note : str
-        What the errors of slopes leave out.
-    """
+    """Effects of the numbers of a problem on its best value, which is as certified."""
 
     name: str
     objective: str
     value: float
     error: float
     effects: tuple[Effect, ...]
-    note: str = ""
 
     def __repr__(self) -> str:
         return f"<Sensitivity of {self.name} to {len(self.effects)} numbers>"
@@ -150,13 +95,17 @@ class Sensitivity:
         return "\n".join(self.lines())
 
     def facts(self) -> dict[str, Any]:
-        """Plain numbers (JSON)."""
-        effects = [
-            vars(effect) | {"again": [each.facts() for each in effect.again]}
-            for effect in self.effects
-        ]
-        own = {key: value for key, value in vars(self).items() if key != "effects"}
-        return own | {"effects": effects}
+        """Plain numbers (JSON); None for what there is not."""
+        effects = []
+        for effect in self.effects:
+            again = []
+            for each in effect.again:
+                plain = vars(each) | {"behind": each.behind}
+                words = {name: plain.pop(name) for name in ("status", "breaks")}
+                finite = {name: float(x) if np.isfinite(x) else None for name, x in plain.items()}
+                again.append(finite | words)
+            effects.append(vars(effect) | {"again": again})
+        return vars(self) | {"effects": effects}
 
     @property
     def seen(self) -> list[Effect]:
@@ -188,58 +137,28 @@ class Sensitivity:
             )
         if without := [effect.name for effect in self.effects if effect not in seen]:
             lines.append(f"  no effect to first order: {', '.join(without)}")
-        lines += [f"  {self.note}"] if self.note else []
-        rows = [f"  {e.name:<{width}}  {self._row(e, x)}" for e in self.effects for x in e.again]
+        rows = []
+        for effect in self.effects:
+            scale, unit = (100, " %") if effect.relative else (1, "")
+            for there in effect.again:
+                change, best = f"{there.change * scale:+.3g}{unit}", f"{there.value:.4f}"
+                first, behind = self.value + there.change * effect.slope, f"{there.behind:9.1e}"
+                if not np.isfinite(there.value):
+                    best, behind = "-", f"  {there.status}"
+                row = f"{change:>7s}  {first:11.4f}  {best:>10s}  {there.kept:8.4f}  {behind}"
+                rows.append(f"  {effect.name:<{width}}  {row}  {there.breaks}".rstrip())
         head = (
             f"{'change':>7s}  {'first order':>11s}  {'best there':>10s}  {'on file':>8s}  behind by"
         )
         return [*lines, "", f"  {'':<{width}}  {head}", *rows] if rows else lines
 
-    def _row(self, effect: Effect, there: Again) -> str:
-        unit = (100, " %") if effect.relative else (1, "")
-        change = f"{there.change * unit[0]:+.3g}{unit[1]}"
-        first, best = self.value + there.change * effect.slope, f"{there.value:.4f}"
-        behind = f"{there.behind:9.1e}"
-        if not np.isfinite(there.value):
-            best, behind = "-", f"  {there.status}"
-        return (
-            f"{change:>7s}  {first:11.4f}  {best:>10s}  {there.kept:8.4f}  {behind}  {there.breaks}"
-        ).rstrip()
-
 
 def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANGE) -> Sensitivity:
     """Derivatives of the best value with respect to every number of the problem.
 
-    Parameters
-    ----------
-    solution : Solution
-        Solved.
-    resolve : bool
-        Whether to re-optimise the gait with each number that matters a little smaller and larger,
-        and to replay the gait on file there; a second or two for each.
-    change : float
-        How much smaller and larger, then.
-
-    Returns
-    -------
-    Sensitivity
-
-    Raises
-    ------
-    ProblemError
-        If the gait is no optimum: it was given, or the solve did not end well.
-
-    Examples
-    --------
-    Forces are proportional to friction, so half as much of it costs half as much:
-
-    >>> import colloc
-    >>> solution = colloc.solve(colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"),
-    ...     delta=1e-2), starts=1)
-    >>> found = solution.sensitivity()
-    >>> slopes = [found[f"friction {way}"].slope for way in ("sideways", "forwards", "backwards")]
-    >>> bool(abs(sum(slopes) / solution.value + 1) < 1e-4)
-    True
+    With `resolve` the gait is re-optimised with each number that matters smaller and larger by
+    `change`, and the gait on file replayed there, in a second or two for each. `ProblemError` if
+    the gait is no optimum: it was given, or the solve did not end well.
     """
     if solution.answer.program == EVALUATED or not solution.problem.gait.free:
         raise ProblemError(
@@ -268,81 +187,64 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
     return Sensitivity(problem.name, problem.objective.short, *stated, tuple(effects))
 
 
-@dataclass(frozen=True, eq=False)
-class _Lagrangian:
-    """Lagrangian of the reduced program on one mesh at its optimum, as a function of the
-    problem."""
+def _on_meshes(answer: Answer) -> list[Callable[[Problem], float]]:
+    """Lagrangians at the optima of several meshes, as functions of the problem, the finest
+    first."""
+    problem, gait, delta, edges = answer.problem, answer.gait, answer.delta, answer.edges
+    far = far_pairs(problem.body)
 
-    space: SearchSpace  # the class of gaits on its mesh, for the problem as it was solved
-    v: np.ndarray  # the gait
-    on_rows: dict[tuple[str, int], float]  # multipliers by names of rows, positive at upper bounds
-    on_bounds: np.ndarray  # of the parameters' bounds
-
-    @classmethod
-    def at_optimum(cls, space: SearchSpace, v: np.ndarray, delta: float) -> _Lagrangian:
-        program = ReducedProgram(space, delta)
-        program.place_rows(v)
-        found = stationarity(program, v)
-        if not found.kkt_error <= _STATIONARY * abs(program.objective(v)):
-            why = f"the gradient of the Lagrangian does not vanish ({found.kkt_error:.0e})"
-            raise ProblemError(f"the gait has no sensitivity: {why}, as where it rests on a kink.")
-        named = zip(program.row_names, found.on_rows, strict=True)
-        on_rows = {name: float(multiplier) for name, multiplier in named if multiplier}
-        return cls(space, v, on_rows, found.on_bounds)
-
-    def __call__(self, problem: Problem) -> float:
-        """Value with the rows at the worst instants of the gait, in units of the objective."""
-        program = ReducedProgram(
-            space_of(problem, None, self.space.edges, self.space.scheme, self.space.far),
-            problem.delta,
-        )
-        program.place_rows(self.v)
-        at = {name: k for k, name in enumerate(program.row_names)}
-        if missing := self.on_rows.keys() - at.keys():
-            what = f"the bound {min(missing)[0]!r}, which holds the gait back, vanishes beside it"
-            raise ProblemError(f"the gait has no sensitivity: {what}.")
-        which = [at[name] for name in self.on_rows]
-        rows, low, high = (
-            row[which] for row in (program.rows(self.v), program.row_lower, program.row_upper)
-        )
-        left = _beyond(rows, low, high, np.array([*self.on_rows.values()]))
-        left += _beyond(self.v, program.lower, program.upper, self.on_bounds)
-        return program.stated(program.objective(self.v)) + program.stated(1.0) * left
-
-
-def _beyond(
-    values: np.ndarray, low: np.ndarray, high: np.ndarray, multipliers: np.ndarray
-) -> float:
-    """Multipliers times (value - bound)."""
-    bounds = np.select([multipliers > 0, multipliers < 0], [high, low], values)
-    return float(multipliers @ (values - bounds))
-
-
-def _on_meshes(answer: Answer) -> list[_Lagrangian]:
-    """Lagrangians at the optima of several meshes, the finest first."""
-    edges = answer.edges
-    space, v = space_near(answer.problem, answer.gait, edges, answer.scheme)
-    far = far_pairs(answer.problem.body)
-    solved = _Lagrangian.at_optimum(with_far(space, far), v, answer.delta)
-
-    def on(parts: int, later: float = 0.0) -> _Lagrangian:
+    def on(parts: int, later: float = 0.0) -> Callable[[Problem], float]:
         inner = edges[:-1, None] + (np.arange(parts) + later) / parts * np.diff(edges)[:, None]
         finer = np.unique([edges[0], *inner.flat, edges[-1]])
-        space = on_mesh_of(solved.space, answer.gait, finer, answer.scheme)
-        found = optimise(space, space.parameters(answer.gait), answer.delta, FINE)
-        return _Lagrangian.at_optimum(found.space, found.v, answer.delta)
+        optimum = optimise(*space_near(problem, gait, finer, answer.scheme, far), delta, FINE)
+        return _lagrangian(optimum.space, optimum.v, delta)
 
-    fixed = answer.problem.gait.relative_delta or not answer.problem.gait.free
-    return [on(_FINEST), on(2), solved if fixed else on(4, 0.5)]
+    solved = _lagrangian(*space_near(problem, gait, edges, answer.scheme, far), delta)
+    fixed = problem.gait.relative_delta or not problem.gait.free
+    return [on(8), on(2), solved if fixed else on(4, 0.5)]
+
+
+def _lagrangian(space: SearchSpace, v: np.ndarray, delta: float) -> Callable[[Problem], float]:
+    """Lagrangian of the reduced program on one mesh at its optimum, in units of the objective, as a
+    function of the problem: with the rows at the worst instants of the gait."""
+    optimum = ReducedProgram(space, delta)
+    optimum.place_rows(v)
+    conditions = stationarity(optimum, v)
+    if not conditions.kkt_error <= 1e-4 * abs(optimum.objective(v)):
+        why = f"the gradient of the Lagrangian does not vanish ({conditions.kkt_error:.0e})"
+        raise ProblemError(f"the gait has no sensitivity: {why}, as where it rests on a kink.")
+    named = zip(optimum.row_names, conditions.on_rows, strict=True)
+    on_rows = {name: float(multiplier) for name, multiplier in named if multiplier}
+
+    def beyond(x: np.ndarray, low: np.ndarray, high: np.ndarray, on: np.ndarray) -> float:
+        """Multipliers, positive at upper bounds, times (value - bound)."""
+        return float(on @ (x - np.select([on > 0, on < 0], [high, low], x)))
+
+    def lagrangian(problem: Problem) -> float:
+        there = space_of(problem, space.edges, space.scheme, space.far)
+        program = ReducedProgram(there, problem.delta)
+        program.place_rows(v)
+        at = {name: k for k, name in enumerate(program.row_names)}
+        if missing := on_rows.keys() - at.keys():
+            what = f"the bound {min(missing)[0]!r}, which holds the gait back, vanishes beside it"
+            raise ProblemError(f"the gait has no sensitivity: {what}.")
+        rows = (program.rows(v), program.row_lower, program.row_upper)
+        which = [at[name] for name in on_rows]
+        values, low, high = (row[which] for row in rows)
+        left = beyond(values, low, high, np.array([*on_rows.values()]))
+        left += beyond(v, program.lower, program.upper, conditions.on_bounds)
+        return program.stated(program.objective(v)) + program.stated(1.0) * left
+
+    return lagrangian
 
 
 def _neighbours(parameter: Parameter, step: float) -> dict[int, Problem]:
     """Problems with a number a little smaller (-1) and larger (1), where that is possible."""
-    found = {}
+    changed = {}
     for side in (-1, 1):
         with suppress(ProblemError):
-            found[side] = parameter.changed(side * step)
-    return found
+            changed[side] = parameter.changed(side * step)
+    return changed
 
 
 def _slope(
@@ -360,30 +262,26 @@ def _slope(
 
 
 def _again(solution: Solution, problem: Problem, change: float) -> Again:
-    gait, delta = solution.answer.gait, problem.delta
+    gait, delta, turn = solution.answer.gait, problem.delta, problem.rotation or 0.0
     space, v = space_near(problem, gait)
-    found = finish(problem, optimise(space, v, delta, MEDIUM))
-    best = found.certificate if found.success else UNCERTIFIED
+    end = finish(problem, optimise(space, v, delta, MEDIUM))
+    best = end.certificate if end.success else UNCERTIFIED
     kept = replayer(problem.regime)(
-        problem.body, problem.law, gait, delta_per_period(problem.gait, gait, delta),
-        breaks=gait.corner_phases, objective=problem.objective, quantities=problem.integrals,
-        turn=problem.rotation or 0.0,
-    )  # fmt: skip
-    breaks = "; ".join(_violations(problem, kept, ReducedProgram(space, delta).place_rows(v)))
-    here = kept.value, kept.error * abs(kept.value)
-    return Again(change, best.value, best.value_error, found.status, *here, breaks)
-
-
-def _violations(problem: Problem, kept: Replay, excess: float) -> Iterator[str]:
-    if excess > _EXCESS:
-        yield f"{excess:.2g} beyond its limits"
-    turned = kept.rotation - (problem.rotation or 0.0)
-    asked = (
-        problem.rotation is not None
-        and problem.regime.closing_symmetry(problem.gait.symmetry) == NONE
+        *(problem.body, problem.law, gait, delta_per_period(problem.gait, gait, delta)),
+        breaks=gait.corner_phases,
+        objective=problem.objective,
+        quantities=problem.integrals,
+        turn=turn,
     )
-    if asked and abs(turned) > _TURNS:
-        yield f"turns {np.degrees(turned):+.2g}° too far a period"
+    breaks, turned = [], kept.rotation - turn
+    excess = ReducedProgram(space, delta).place_rows(v)
+    if excess > 1e-5:  # [rad], or relative
+        breaks.append(f"{excess:.2g} beyond its limits")
+    closing = problem.regime.closing_symmetry(problem.gait.symmetry)
+    if problem.rotation is not None and closing == NONE and abs(turned) > 1e-4:
+        breaks.append(f"turns {np.degrees(turned):+.2g}° too far a period")
     for aim, least in problem.at_least:
-        if aim(kept.values) < least * (1 - _EXCESS):
-            yield f"{aim.name} {aim(kept.values):.4g}, not {least:.4g}"
+        if aim(kept.values) < least * (1 - 1e-5):
+            breaks.append(f"{aim.name} {aim(kept.values):.4g}, not {least:.4g}")
+    here = kept.value, kept.error * abs(kept.value)
+    return Again(change, best.value, best.value_error, end.status, *here, "; ".join(breaks))

@@ -1,8 +1,8 @@
 """Stages from a problem to a certified solution: explore, descend, refine, confirm, certify,
 choose.
 
-Each stage is a function of one value that returns the next one, in a module of its name. Retries,
-time limits and interrupts are decided here.
+Each stage is a function of one value that returns the next one. Retries, time limits and interrupts
+are decided here.
 """
 
 from __future__ import annotations
@@ -15,32 +15,30 @@ from pathlib import Path
 
 import numpy as np
 
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.gaits.starts import is_visible, on_speed_floor
 from colloc.results.answer import Answer
 from colloc.results.checks import Certificate
 from colloc.results.solution import Solution
 from colloc.search.certify import certify, is_trivial
 from colloc.search.checkpoint import Progress, Run, active_run, checkpointed
-from colloc.search.choose import choose, is_visible_solution, passes, solution_of
-from colloc.search.confirm import answer_of_iterate, confirm
-from colloc.search.descend import descend, leave_saddle
-from colloc.search.direct_nlp import solve_directly
-from colloc.search.explore import (
-    Exploration,
-    explore,
-    first_optimum,
-    follow_rest,
-    is_finite,
-)
-from colloc.search.iterate import Iterate, evaluate_at
-from colloc.search.options import OPTIONS, TOLERANCES
-from colloc.search.refine import refine
-from colloc.search.spaces import space_near, space_of
+from colloc.search.confirm import answer_of_iterate, confirm, solve_directly
+from colloc.search.explore import Exploration, explore, first_optimum, follow_rest
+from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
+from colloc.search.optimise import descend, leave_saddle, refine
+from colloc.search.options import OPTIONS, TOLERANCES, settings
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.interruption import clear_interrupt
 
 REDUCED, FULL = "reduced", "full"
 SEARCHES = (REDUCED, FULL)
+_ADVICE = {
+    "joint limits": "another guess or a smaller joint_limit",
+    "self-contact": "another guess or a smaller joint_limit",
+    "delta influence": "a smaller delta",
+    "second order": "another guess or more starts",
+}
 
 
 def solve(
@@ -53,123 +51,75 @@ def solve(
     progress: Callable[[Progress], object] = lambda progress: None,
     accept: Callable[[Iterate], bool] = lambda first: True,
 ) -> Solution:
-    """The best gait of a problem's class that so many starts lead to, certified.
+    """The best gait of a problem's class that so many starts lead to, certified; see
+    `colloc.solve`.
 
-    Parameters
-    ----------
-    problem : Problem
-    starts : int, optional
-        Starts at least: the guess, known gaits, seeded samples (`colloc.search.explore`), and small
-        loops beside them. With 1 the guess alone. By default 32, with inertia 96; fewer once four
-        new ones, and one in eight, met the best.
-    seconds : float
-        Wall time allowed. Then the best gait so far is returned, with status "interrupted" unless
-        its certificate passes.
-    search : {"reduced", "full"}
-        Where gaits are searched: in the space of their parameters, or by IPOPT on the full program,
-        from the guess alone.
-    keep : path, optional
-        Checkpoint file: a solve of the same problem goes on from what is there.
-    progress : callable, optional
-        Called with every `colloc.search.checkpoint.Progress`.
-    accept : callable, optional
-        Whether the best gait, at the final delta and before its mesh is refined, is worth an
-        answer. By default it is.
-
-    Returns
-    -------
-    Solution
-        With status "solved", "not converged", "certificate failed" or, after Ctrl-C or when the
-        time is over, "interrupted"; nothing is raised for the last three.
-
-    Examples
-    --------
-    >>> from colloc import Harmonic, Problem, ellipse
-    >>> from colloc.search.solve import solve
-    >>> solve(Problem("near", ellipse(A0=0, A1=2.8, B1=1.3), gait=Harmonic(1, "bilateral")),
-    ...     starts=1).status
-    'solved'
+    `keep` is a checkpoint file: a solve of the same problem goes on from what is there. `accept`
+    says whether the best gait, at the final delta and before its mesh is refined, is worth an
+    answer. After Ctrl-C, or once the time is over, the best gait so far is returned.
     """
     if search not in SEARCHES:
         raise ProblemError(f"search must be one of {', '.join(SEARCHES)}, not {search!r}.")
     begin, run = time.monotonic(), Run(keep, problem, progress)
-
-    def has_time() -> bool:
-        return time.monotonic() < begin + OPTIONS.exploring * seconds
-
     try:
         with run.active(seconds):
             if search == FULL and problem.gait.free:
                 solution = certify_answer(problem, solve_directly(problem))
             else:
-                solution = _solve(problem, starts, has_time, accept)
+                solution = _solve(problem, starts, accept)
     except KeyboardInterrupt:
         clear_interrupt()
         over = time.monotonic() - begin >= seconds
         why = f"the {seconds:g} s allowed are over" if over else "interrupted"
         solution = _best_so_far(problem, run, why)
     solution.seconds = time.monotonic() - begin
+    for each in (solution, solution.shrunk):
+        if each is not None:
+            each.settings = settings()
     return solution
 
 
-def _solve(
-    problem: Problem,
-    starts: int | None,
-    has_time: Callable[[], bool],
-    accept: Callable[[Iterate], bool],
-) -> Solution:
-    explored = _explore(problem, starts, has_time)
+def _solve(problem: Problem, starts: int | None, accept: Callable[[Iterate], bool]) -> Solution:
+    explored, failure = None, ""
+    if starts != 1 and problem.gait.free:
+        try:
+            explored = explore(problem, starts)
+        except NotConvergedError as error:
+            failure = str(error)  # what fails with the guess alone is said in detail
+    explored = explored or Exploration([first_optimum(problem, problem.guess)], 1)
     first = descend(explored.optima[0])
     if not accept(first):
         return Solution(problem, answer_of_iterate(first))
     solutions = _finish_best(problem, (first, *explored.optima[1:]))
-    if not any(map(passes, solutions)) and explored.left:
-        solutions += _finish_best(problem, follow_rest(problem, explored, has_time))
+    if explored.left and not any(map(passes, solutions)):
+        solutions += _finish_best(problem, follow_rest(problem, explored))
     solution = choose(problem, solutions)
-    solution.starts, solution.others = explored.starts, explored.others
-    if explored.failure and not solution.success:
-        why = explored.failure[:1].upper() + explored.failure[1:]
+    solution.starts, solution.others = explored.starts, tuple(explored.others)
+    if failure and not solution.success:
+        why = failure[:1].upper() + failure[1:]
         solution.message = f"{solution.message} {why}".strip()
     return solution
 
 
-def _explore(problem: Problem, starts: int | None, has_time: Callable[[], bool]) -> Exploration:
-    failure = ""
-    if starts != 1 and problem.gait.free:
-        try:
-            return explore(problem, starts, has_time)
-        except NotConvergedError as error:
-            failure = str(error)  # what fails with the guess alone is said in detail
-    return Exploration((first_optimum(problem, problem.guess),), 1, failure=failure)
-
-
 def _finish_best(problem: Problem, optima: Sequence[Iterate]) -> list[Solution]:
     """Solutions of the best optima: of finite size first, then better ones that shrank; all in one
-    order where the problem asks for any size."""
-    if problem.shrinking:
-        return _finish_until(problem, optima, passes)
-    solutions = _finish_until(
-        problem,
-        [optimum for optimum in optima if is_finite(optimum)],
-        lambda solution: passes(solution) and is_visible_solution(solution),
-    )
-    best = max((each.answer.value for each in solutions if passes(each)), default=-np.inf)
-    better = [each for each in optima if not is_finite(each) and each.value > best]
-    return solutions + _finish_until(problem, better, passes)
-
-
-def _finish_until(
-    problem: Problem, optima: Sequence[Iterate], counts: Callable[[Solution], bool]
-) -> list[Solution]:
-    """Solutions, best first, as long as none counts, or it lost more on its refined mesh than the
-    next one is behind."""
+    order where the problem asks for any size. Of each kind, best first, as long as none passes, or
+    it lost more on its refined mesh than the next one is behind."""
     solutions: list[Solution] = []
-    for optimum in optima[: OPTIONS.attempts]:
-        best = max((each.answer.value for each in solutions if counts(each)), default=-np.inf)
-        if optimum.value - OPTIONS.close * abs(optimum.value) < best:
-            break
-        solutions.append(finish(problem, optimum))
-        active_run().solutions.append(solutions[-1])
+    for shrank in (None,) if problem.shrinking else (False, True):
+        kind, best = optima, -np.inf
+        if shrank is not None:
+            kind = [each for each in optima if is_visible(each.gait) is not shrank]
+        if shrank:
+            least = max((each.answer.value for each in solutions if passes(each)), default=-np.inf)
+            kind = [each for each in kind if each.value > least]
+        for optimum in kind[: OPTIONS.attempts]:
+            if optimum.value - OPTIONS.close * abs(optimum.value) < best:
+                break
+            solutions.append(solution := finish(problem, optimum))
+            active_run().solutions.append(solution)
+            if passes(solution) and (shrank is not False or is_visible(solution.answer.gait)):
+                best = max(best, solution.answer.value)
     return solutions
 
 
@@ -182,44 +132,80 @@ def finish(problem: Problem, optimum: Iterate) -> Solution:
         # a prescribed motion is measured at the delta that is asked for
         if failures != ["delta influence"] or not problem.gait.free:
             break
-        drier = optimum.problem.with_(delta=OPTIONS.delta_ratio * optimum.problem.delta)
-        optimum = _of_problem(optimum, drier)
+        old, stated = optimum.space, optimum.problem
+        drier = stated.with_(delta=OPTIONS.delta_ratio * stated.delta)
+        optimum = replace(optimum, space=space_of(drier, old.edges, old.scheme, old.far))
         with suppress(NotConvergedError):  # there the body may have no such motion
             solution = certify_answer(problem, confirm_optimum(optimum))
     return solution
 
 
-def _of_problem(optimum: Iterate, problem: Problem) -> Iterate:
-    old = optimum.space
-    return replace(optimum, space=space_of(problem, None, old.edges, old.scheme, old.far))
-
-
 def confirm_optimum(optimum: Iterate) -> Answer:
     """An optimum through refine and confirm; where it turns out to be a saddle, the one below."""
-    optimum = refine(descend(optimum))
-    answer = confirm(optimum)
-    for _ in range(OPTIONS.attempts):
+    below: Iterate | None = descend(optimum)
+    for _ in range(1 + OPTIONS.attempts):
+        if below is None:
+            break
+        optimum = refine(below)
+        active_run().report("confirm", 0, 1, optimum)
+        answer = confirm(optimum)
         second = answer.second_order
         if not second.smallest + second.error < -TOLERANCES.saddle:
             break
         below = leave_saddle(optimum)
-        if below is None:
-            break
-        optimum = refine(below)
-        answer = confirm(optimum)
     return answer
 
 
 def certify_answer(problem: Problem, answer: Answer) -> Solution:
-    """A solution with its certificate; without one where the gait goes nowhere, or cannot be
-    replayed."""
+    """A solution with its certificate and message; without a certificate where the gait goes
+    nowhere, or cannot be replayed."""
+    is_free, text, solution = problem.gait.free, answer.message, Solution(problem, answer)
     if answer.problem.gait.free and is_trivial(answer):
-        return solution_of(problem, answer)
+        solution.message = (
+            f"no gait was found that climbs a grade of {problem.grade:g}, or goes the way asked "
+            f"for. Try a gentler slope, more starts, or more harmonics."
+            if problem.regime.slides
+            else "the search ended in a trivial gait that goes nowhere (every retraced gait is a "
+            "critical point). Try another guess, or an imposed symmetry."
+        )
+        return solution
     active_run().report("certify", 0, 1)
     try:
-        return solution_of(problem, answer, _certificate(answer))
+        solution.certificate = _certificate(answer)
     except NotConvergedError as error:
-        return solution_of(problem, answer, failure=str(error))
+        solution.message = f"the replay failed: {error}"
+        return solution
+    if text and not answer.optimal:
+        solution.message = text  # why the search ended says more than what does not hold for that
+        return solution
+    if failed := solution.certificate.failures:
+        failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)
+        finer = "a smaller mesh_tolerance"
+        advice = " and ".join(dict.fromkeys(_ADVICE.get(c.name, finer) for c in failed))
+        text = f"the certificate failed: {failures}. Try {advice}. {text}"
+    elif is_free and on_speed_floor(problem, answer.gait):
+        better = "more efficient" if problem.objective == EFFICIENCY else "better"
+        text = (
+            f"the optimum lies on the bound smallest_shape_speed = "
+            f"{problem.smallest_shape_speed:g}: the gait shrinks as far as it may, smaller ones "
+            f"are {better} still. For a gait that a robot can make raise the bound; to see how far "
+            "smaller ones go, lower it (and delta with it)."
+        )
+    elif is_free and on_speed_floor(answer.problem, answer.gait):
+        text = (
+            "Gaits that become smaller become better here, so the search kept them large: it met "
+            "no better gait with a shape speed of "
+            f"{answer.problem.smallest_shape_speed:.2g} or more. For another size state "
+            f"smallest_shape_speed, or the distance, "
+            'at_least={"distance": 0.1}.'
+        )
+    if answer.delta < problem.delta * (1 - 1e-9):
+        text += (
+            f" The gait is so slow or small that delta had to be lowered from "
+            f"{problem.delta:.1g} to {answer.delta:.1g}."
+        )
+    solution.message = text.strip()
+    return solution
 
 
 @checkpointed
@@ -231,14 +217,48 @@ def _certificate(answer: Answer) -> Certificate:
     return certify(answer, tolerance=TOLERANCES.replay_gap, instants=instants)
 
 
+def passes(solution: Solution) -> bool:
+    """True if the first-order conditions and every check of the certificate hold."""
+    return solution.answer.optimal and solution.certificate.passed
+
+
+def choose(problem: Problem, solutions: Sequence[Solution]) -> Solution:
+    """The best solution of finite size whose certificate passes (of any size, if the problem asks
+    for that, or there is no other), else the first one.
+
+    With dry friction small cycles may go farthest for their work, but nobody can build those: a
+    better one that nobody sees move is returned beside it, as `shrunk`.
+    """
+
+    def value(solution: Solution) -> float:
+        return solution.answer.value
+
+    passing = [each for each in solutions if passes(each)]
+    finite = [each for each in passing if problem.shrinking or is_visible(each.answer.gait)]
+    solution = replace(max(finite or passing, key=value, default=solutions[0]))
+    better = [each for each in solutions if value(each) > value(solution)]
+    failing = [each for each in better if not passes(each)]
+    if passes(solution) and failing:
+        text = f"A gait of {value(failing[0]):.4f} is not certified: {failing[0].message}"
+        solution.message = f"{solution.message} {text}".strip()
+    smaller = [each for each in better if passes(each) and not is_visible(each.answer.gait)]
+    if finite and smaller and not problem.shrinking:
+        solution.shrunk = max(smaller, key=value)
+        text = (
+            f"Smaller gaits do better still: {solution.shrunk.certificate.value:.6f} where one "
+            f"shrank until nobody sees it move, kept beside this one."
+        )
+        solution.message = f"{solution.message} {text}".strip()
+    return solution
+
+
 def _best_so_far(problem: Problem, run: Run, why: str) -> Solution:
     if any(map(passes, run.solutions)):
         solution = choose(problem, run.solutions)
     elif run.solutions:
         solution = Solution(problem, run.solutions[0].answer)
     else:
-        guess = space_near(problem, problem.guess)
-        best = run.best or evaluate_at(*guess, problem.delta_start)
+        best = run.best or evaluate_at(*space_near(problem, problem.guess), problem.delta_start)
         solution = Solution(problem, answer_of_iterate(best))
     solution.interrupted = True
     solution.message = f"{why}; this is the best gait so far. {solution.message}".strip()

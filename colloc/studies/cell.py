@@ -18,9 +18,8 @@ from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait, to_class
 from colloc.results.archive import ERROR, Outcome, outcome_fields, outcome_from
 from colloc.results.distinct_optima import SAME_GAIT, distance, fourier_series, phase_distance
 from colloc.results.solution import SOLVED
-from colloc.search.closure import project_to_zero_rotation
-from colloc.search.iterate import Iterate
-from colloc.search.spaces import space_near
+from colloc.search.iterate import Iterate, space_near
+from colloc.search.optimise import project_to_zero_rotation
 from colloc.studies.solve import run_guess
 from colloc.studies.study import Index
 from colloc.system.errors import CollocError
@@ -122,7 +121,7 @@ def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
         return None
     try:
         similar = to_class(gaits, gait, body, problem.joint_limit, problem.smallest_shape_speed)
-        space, v = space_near(problem, project_to_zero_rotation(problem, similar))
+        space, v = space_near(problem, project_to_zero_rotation(problem, similar, problem.delta))
         projection = space.member(v)
         problem.with_(guess=projection)
     except CollocError:

@@ -56,7 +56,7 @@ def test_verify_finds_a_tampered_certificate_and_a_tampered_gait(three_link, tmp
     assert "is off by" in report["complaint"]
 
     x = three_link.answer.x.copy()
-    x[three_link.layout.parameters[1, 0]] += 0.05
+    x[three_link.answer.layout.parameters[1, 0]] += 0.05
     file = save(changed(three_link, answer=replace(three_link.answer, x=x)), tmp_path / "gait.h5")
     assert recheck.verify([str(file)]) == 4
     assert "NOT CERTIFIED" in capsys.readouterr().out

@@ -10,7 +10,7 @@ from colloc.gaits.regime import Regime
 from colloc.pictures.export import mjcf
 from colloc.reduced.motion import ReducedMotion
 from colloc.results.robot import joint_torques
-from colloc.search.spaces import space_near
+from colloc.search.iterate import space_near
 from colloc.verification.differential_motion import inertial_motion
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[1.17], [0.12]], sin=[[0.0], [-0.91]], theta=0.7)

@@ -9,7 +9,7 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
 from colloc.reduced.program import ReducedProgram
 from colloc.results.motion import arc
-from colloc.search.spaces import space_near
+from colloc.search.iterate import space_near
 from colloc.transcription.full_program import full_program
 from colloc.verification.differential_motion import inertial_replay
 from colloc.verification.mesh_error import mesh_error

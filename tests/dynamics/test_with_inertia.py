@@ -15,7 +15,7 @@ from colloc.mechanics.inertia import kinetic_energy, momentum_rates
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.pictures.movie import pictures
 from colloc.reduced.program import ReducedProgram
-from colloc.search.spaces import space_near
+from colloc.search.iterate import space_near
 from colloc.verification.mesh_error import mesh_error
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])

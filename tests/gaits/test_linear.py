@@ -12,7 +12,7 @@ from colloc.gaits.linear import enclosed_area
 from colloc.gaits.starts import initial_member
 from colloc.gaits.symmetry import SYMMETRIES
 from colloc.reduced.program import ReducedProgram
-from colloc.search.spaces import space_near
+from colloc.search.iterate import space_near
 
 T = np.arange(200) / 200
 PHASES = np.arange(96) / 96

@@ -6,9 +6,10 @@ import pytest
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, ProblemError, Serpenoid
 from colloc.reduced.program import ReducedProgram
 from colloc.results.store import load, save
+from colloc.search.iterate import space_near
 from colloc.search.solve import solve
-from colloc.search.spaces import program_of, space_near
 from colloc.transcription.layout import RADIANS
+from tests.shared.stages import program_of
 
 FIVE = Chain((0.2,) * 5)
 SNAKE = Friction(mu_t=10, mu_f=1, mu_b=1)

@@ -14,8 +14,8 @@ from cases import HARD
 
 from colloc import Chain, Friction, Problem, solve_balance
 from colloc.mechanics.balance import instant
-from colloc.search.spaces import program_of
 from tests.shared.laws import coulomb
+from tests.shared.stages import program_of
 
 STENCIL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))
 THREE, FOUR = Chain(), Chain((0.2, 0.35, 0.3, 0.15))

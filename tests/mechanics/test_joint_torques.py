@@ -8,8 +8,8 @@ from shared.instants import random_instants
 from colloc import Chain, Fourier, Friction, Harmonic, PowerLaw, Problem, Viscous, replay
 from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
-from colloc.search.spaces import program_of
 from colloc.transcription.full_program import ACTUATORS
+from tests.shared.stages import program_of
 
 ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)

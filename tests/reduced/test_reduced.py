@@ -6,7 +6,7 @@ import pytest
 
 from colloc import BSpline, Chain, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
-from colloc.search.spaces import space_near
+from colloc.search.iterate import space_near
 from tests.shared.cases import cases
 from tests.shared.stages import answer_near
 

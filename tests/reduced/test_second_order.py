@@ -9,7 +9,7 @@ from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.mechanics.densities import Instants
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
-from colloc.search.spaces import space_near
+from colloc.search.iterate import space_near
 from tests.shared.stages import answer_near
 
 PROBLEM = Problem("bilateral", gait=Harmonic(1, "bilateral"), intervals=100)

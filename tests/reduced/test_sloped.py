@@ -23,7 +23,7 @@ from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import fields, gait_from
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver
-from colloc.search.spaces import space_near
+from colloc.search.iterate import space_near
 from colloc.transcription.full_program import full_program
 from colloc.verification.differential_motion import slope_motion
 

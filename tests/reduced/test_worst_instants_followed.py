@@ -10,10 +10,10 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Problem
 from colloc.gaits.starts import latin_hypercube_gait
 from colloc.reduced.program import ReducedProgram
-from colloc.search import converge
-from colloc.search.converge import solve_subproblems
+from colloc.search import optimise as converge
+from colloc.search.iterate import space_near
+from colloc.search.optimise import solve_subproblems
 from colloc.search.options import FINE, OPTIONS
-from colloc.search.spaces import space_near
 
 BODIES = {
     "none": Chain((0.3, 0.2, 0.15, 0.35)),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from colloc import StoreError, load, save
+from colloc.search.options import OPTIONS, TOLERANCES, SearchOptions, Tolerances
 
 
 def test_round_trip_keeps_everything(three_link, tmp_path):
@@ -15,6 +16,8 @@ def test_round_trip_keeps_everything(three_link, tmp_path):
     assert again.status == "solved"
     assert again.certificate == three_link.certificate
     assert again.source == three_link.source
+    assert Tolerances(**again.settings["tolerances"]) == TOLERANCES
+    assert SearchOptions(**again.settings["options"]) == OPTIONS
     assert len(again.history) == len(three_link.history)
     assert again.starts == three_link.starts > 1
     assert [other.value for other in again.others] == [other.value for other in three_link.others]

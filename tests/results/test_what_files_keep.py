@@ -77,10 +77,14 @@ def test_a_delta_that_was_lowered_for_a_small_gait_is_that_of_the_result_as_read
     np.testing.assert_array_equal(again.sample(t).z, solution.sample(t).z)
 
 
+def tenfold(number):
+    return 10 * number
+
+
 def test_rows_that_the_disk_refused_are_written_when_it_takes_them_again(tmp_path, monkeypatch):
     path = tmp_path / "x.run.sqlite"
     run = Run(path, QUICK)
-    run.result("stage", (1.0,), lambda: 10.0)
+    run.result(tenfold, (1.0,))
     with monkeypatch.context() as patch:
         patch.setattr(
             run_module,
@@ -89,20 +93,22 @@ def test_rows_that_the_disk_refused_are_written_when_it_takes_them_again(tmp_pat
         )
         with pytest.warns(ReadOnlyRunWarning, match="the disk is full"):
             run.write()
-        run.result("stage", (2.0,), lambda: 20.0)
+        run.result(tenfold, (2.0,))
     run.write()
     assert sorted(value for key, value in read_rows(path, ROWS).items() if key != "problem") == [
         10.0,
         20.0,
     ]
     again = Run(path, QUICK)
-    assert [again.result("stage", (x,), lambda: None) for x in (1.0, 2.0)] == [10.0, 20.0]
+    assert [again.result(tenfold, (x,)) for x in (1.0, 2.0)] == [10.0, 20.0]
+    assert again.n_reused == 2
 
 
 def test_what_another_process_computed_is_in_the_file_of_the_run(tmp_path):
     other = Run(problem=QUICK, stores=True)
-    other.result("stage", (1.0,), lambda: 10.0)
+    other.result(tenfold, (1.0,))
     run = Run(tmp_path / "x.run.sqlite", QUICK)
     run.update(other.rows)
     run.write()
-    assert Run(tmp_path / "x.run.sqlite", QUICK).result("stage", (1.0,), lambda: None) == 10.0
+    again = Run(tmp_path / "x.run.sqlite", QUICK)
+    assert (again.result(tenfold, (1.0,)), again.n_reused) == (10.0, 1)

@@ -11,8 +11,8 @@ import pytest
 import colloc
 from benchmarks.kills import contents
 from colloc import Harmonic, Problem
-from colloc.search import ahead
-from colloc.search.checkpoint import Run
+from colloc.search import checkpoint as ahead
+from colloc.search.checkpoint import Ahead, Run
 from colloc.search.explore import explore, sketch
 from colloc.search.options import SearchOptions
 
@@ -49,7 +49,7 @@ def alone(tmp_path_factory):
 
 
 def test_the_file_is_the_same_to_the_last_bit(alone, received, tmp_path, monkeypatch):
-    wait_for = ahead.Ahead.wait_for
+    wait_for = Ahead.wait_for
 
     def patient(self, *task):
         until = time.monotonic() + 60.0
@@ -57,7 +57,7 @@ def test_the_file_is_the_same_to_the_last_bit(alone, received, tmp_path, monkeyp
             time.sleep(0.01)
         wait_for(self, *task)
 
-    monkeypatch.setattr(ahead.Ahead, "wait_for", patient)
+    monkeypatch.setattr(Ahead, "wait_for", patient)
     colloc.solve(PROBLEM, starts=8, output=tmp_path / "quick.h5")
     assert sum(n_rows > 0 for n_rows, _ in received) > 1
     assert received[0][1].n_reused > 0.5 * sum(n_rows for n_rows, _ in received)
@@ -77,15 +77,16 @@ def test_so_it_is_if_they_die(alone, received, tmp_path, monkeypatch):
 
 def test_none_is_begun_for_what_this_process_alone_knows_nor_for_little(received, monkeypatch):
     run = Run(problem=PROBLEM)
-    with run.active(60.0), ahead.computing_ahead(SimpleNamespace(law=lambda: 0)) as some:
-        some.begin(1e3)
-        assert some.count == 0
+    run.problem = SimpleNamespace(law=lambda: 0)
+    run.ahead.begin(1e3)
+    assert run.ahead.count == 0
     monkeypatch.setattr(ahead, "OPTIONS", SearchOptions(worth_a_process=2.0))
-    with run.active(60.0), ahead.computing_ahead(PROBLEM) as some:
-        some.begin(1.9)
-        assert some.count == 0
-        some.begin(2.1)
-        assert some.count == 2
+    some = Run(problem=PROBLEM).ahead
+    some.begin(1.9)
+    assert some.count == 0
+    some.begin(2.1)
+    assert some.count == 2
+    some.end()
 
 
 def test_none_is_begun_where_a_stage_is_called_by_itself(received):
@@ -96,14 +97,15 @@ def test_none_is_begun_where_a_stage_is_called_by_itself(received):
 def test_files_of_the_folder_are_not_run(received, tmp_path, monkeypatch):
     (tmp_path / "random.py").write_text("open('ran', 'w').close()", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    with Run(problem=PROBLEM).active(60.0), ahead.computing_ahead(PROBLEM) as some:
-        some.begin(1e3)
-        for _ in range(2):  # what is asked for twice is computed once
-            some.submit(sketch, PROBLEM, PROBLEM.guess, True, [0.1, 0.01])
-        (future,) = some._futures.values()
-        future.result(timeout=60)
-        for _ in range(2):
-            some.wait_for(sketch, PROBLEM, PROBLEM.guess, True, [0.1, 0.01])
+    some = Run(problem=PROBLEM).ahead
+    some.begin(1e3)
+    for _ in range(2):  # what is asked for twice is computed once
+        some.submit(1, sketch, PROBLEM, PROBLEM.guess, True, [0.1, 0.01])
+    (future,) = some._futures.values()
+    future.result(timeout=60)
+    for _ in range(2):
+        some.wait_for(sketch, PROBLEM, PROBLEM.guess, True, [0.1, 0.01])
+    some.end()
     assert len(received) == 1
     assert received[0][0] > 0
     assert not (tmp_path / "ran").exists()

@@ -14,9 +14,9 @@ from colloc.mechanics.contact import (
     passing_depth,
     smooth_minimum,
 )
-from colloc.search.converge import crossing_pairs, last_free
-from colloc.search.spaces import program_of
+from colloc.search.optimise import crossing_pairs, last_free
 from colloc.transcription.full_program import full_program
+from tests.shared.stages import program_of
 
 BODIES = [Chain((0.25,) * 4), Chain((0.1, 0.4, 0.2, 0.3)), Chain((0.2,) * 5), Chain((1 / 8,) * 8)]
 

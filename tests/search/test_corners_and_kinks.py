@@ -6,10 +6,9 @@ import pytest
 
 from colloc import Chain, Friction, Harmonic, NotConvergedError, Problem, ellipse
 from colloc.gaits.starts import latin_hypercube_gait
-from colloc.search.iterate import evaluate_at
-from colloc.search.refine import refine
+from colloc.search.iterate import evaluate_at, space_near
+from colloc.search.optimise import refine
 from colloc.search.solve import solve
-from colloc.search.spaces import space_near
 
 
 def from_start(start, friction, symmetry, **fields):
@@ -70,7 +69,7 @@ def test_a_gait_whose_finer_mesh_has_no_balance_is_kept_and_says_so(monkeypatch)
     gait = ellipse(A0=0, A1=2.8, B1=1.3)
     problem = Problem("coarse", gait, gait=Harmonic(1, "bilateral"), intervals=8)
     found = evaluate_at(*space_near(problem, gait), problem.delta)
-    monkeypatch.setattr("colloc.search.refine.optimise", fails)
+    monkeypatch.setattr("colloc.search.optimise.optimise", fails)
     kept = refine(found)
     np.testing.assert_array_equal(kept.v, found.v)
     assert kept.message == "refinement ended, as on a finer mesh: the balance did not converge."

@@ -15,12 +15,11 @@ from colloc.results.checks import UNCERTIFIED
 from colloc.results.store import load, save
 from colloc.search import explore
 from colloc.search import solve as stages
-from colloc.search.ahead import Ahead
+from colloc.search.checkpoint import Run
 from colloc.search.explore import multistart
 from colloc.search.solve import solve
 from colloc.system.errors import NotConvergedError
 
-ALONE = Ahead(Problem("alone"))
 UNEQUAL = Problem(
     "unequal",
     body=Chain((0.3, 0.2, 0.15, 0.35)),
@@ -138,7 +137,7 @@ def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkey
     follow = explore.follow
     monkeypatch.setattr(explore, "follow", lambda *at: replace(follow(*at), violation=0.5))
     with pytest.raises(NotConvergedError, match="no gait could be followed"):
-        explore.explore(Problem("broken", gait=Harmonic(1, "bilateral")), 2, lambda: True)
+        explore.explore(Problem("broken", gait=Harmonic(1, "bilateral")), 2)
 
 
 @pytest.mark.parametrize(
@@ -169,20 +168,19 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(
 ):
     numbers = itertools.count()
 
-    def follow(problem, gait, deltas, known, *, is_new):
+    def sketch(problem, gait, is_new, deltas, known):
         if not known[-1]:
-            found = SimpleNamespace(
-                objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0, problem=problem
-            )
+            found = SimpleNamespace(objective=-1.0, gait=ellipse(0, 1.0, 0.5), delta=1.0, v=None)
+            found.problem, found.space = problem, SimpleNamespace(objective=lambda v: -1.0)
             known[-1].append(explore.Candidate(found))
         if next(numbers) in meeting:
-            known[-1][0].count_start(is_new=is_new)
+            known[-1][0].n_new += is_new
 
-    monkeypatch.setattr(explore, "_descend_levels", follow)
+    monkeypatch.setattr(explore, "sketch", sketch)
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
-    monkeypatch.setattr(explore, "objective_at", lambda delta, found: found.objective)
+    monkeypatch.setattr(explore, "ReducedProgram", lambda space, delta: space)
     problem = Problem("same", gait=Harmonic(1, "antipodal"), froude=froude)
-    assert multistart(problem, asked, lambda: True, ALONE)[1] == tried
+    assert multistart(problem, asked)[1] == tried
 
 
 def certified(value, holds=True, finite=True):
@@ -222,7 +220,7 @@ def test_gaits_are_solved_for_until_a_certificate_holds_and_no_other_promises_mo
 
     monkeypatch.setattr(stages, "finish", finish)
     optima = [SimpleNamespace(value=1.0 - 0.1 * k) for k in range(len(ends))]
-    found = stages._finish_until(UNEQUAL, optima, stages.passes)
+    found = stages._finish_best(UNEQUAL.with_(shrinking=True), optima)
     assert (len(found), len(asked)) == (solved_for, solved_for)
 
 
@@ -251,7 +249,8 @@ def test_where_no_certificate_holds_gaits_that_were_left_are_followed_and_the_be
     assert not any(
         explore.same_gait(problem, one, other) for one, other in itertools.combinations(asked, 2)
     )
-    assert explore.follow_rest(problem, explored, lambda: False) == ()
+    monkeypatch.setattr(Run, "has_time", lambda run: False)
+    assert explore.follow_rest(problem, explored) == []
 
 
 @pytest.mark.slow

@@ -9,9 +9,9 @@ import pytest
 import colloc
 from colloc.commands.solve import summary_lines
 from colloc.reduced.program import ReducedProgram
-from colloc.search.converge import optimise
+from colloc.search.iterate import space_near
+from colloc.search.optimise import optimise
 from colloc.search.options import FINE
-from colloc.search.spaces import space_near
 
 ROUND, STANDING_POWER = colloc.ellipse(A0=0, A1=2.2, B1=1.3), "distance / (work + 0.1 * period)"
 

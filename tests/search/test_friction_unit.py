@@ -7,8 +7,8 @@ import pytest
 from colloc import Friction, Harmonic, PathLimit, Problem, ellipse
 from colloc.dynamics.control_problem import control_problem
 from colloc.reduced.program import ReducedProgram
+from colloc.search.iterate import space_near
 from colloc.search.solve import solve
-from colloc.search.spaces import space_near
 from tests.shared.laws import coulomb
 
 

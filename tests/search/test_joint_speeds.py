@@ -6,8 +6,8 @@ import pytest
 import colloc
 from colloc import Chain, Friction, Harmonic, Problem, Serpenoid
 from colloc.reduced.program import ReducedProgram
+from colloc.search.iterate import space_near
 from colloc.search.solve import solve
-from colloc.search.spaces import space_near
 from tests.shared.cases import cases
 
 T = np.linspace(0, 1, 20001)

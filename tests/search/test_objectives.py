@@ -18,8 +18,8 @@ from colloc import (
 from colloc.commands.results import verify
 from colloc.gaits.objective import SPEED
 from colloc.reduced.program import ReducedProgram
+from colloc.search.iterate import space_near
 from colloc.search.solve import solve
-from colloc.search.spaces import space_near
 from tests.shared.cases import cases
 
 THRIFT = "sqrt(distance) / (work + 0.1 * length)"

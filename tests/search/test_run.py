@@ -1,6 +1,7 @@
 """What a run keeps: everything between stages, exactly; so an interrupted solve ends as if nothing
 had happened."""
 
+import functools
 import signal
 import subprocess
 import sys
@@ -17,17 +18,15 @@ from benchmarks.kills import command as solve_command
 from benchmarks.kills import contents
 from colloc import BSpline, Chain, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
 from colloc.gaits.problem_file import read_problem_file
-from colloc.gaits.starts import on_speed_floor
+from colloc.gaits.starts import is_visible, on_speed_floor
 from colloc.results.store import load
 from colloc.search.certify import certify
 from colloc.search.checkpoint import ROWS, STAGES, Run
-from colloc.search.choose import choose, is_visible_solution, solution_of
 from colloc.search.confirm import confirm
-from colloc.search.descend import descend
 from colloc.search.explore import explore, first_optimum
+from colloc.search.optimise import descend, refine
 from colloc.search.options import SearchOptions
-from colloc.search.refine import refine
-from colloc.search.solve import solve
+from colloc.search.solve import certify_answer, choose, solve
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.files import run_file
 from colloc.system.row_file import put_rows, read_rows
@@ -58,8 +57,8 @@ class Stop:
         self.left = number
         result = Run.result
 
-        def stopping(run, stage, given, compute):
-            value = result(run, stage, given, compute)
+        def stopping(run, stage, arguments):
+            value = result(run, stage, arguments)
             self.left -= 1
             if self.left == 0:
                 raise KeyboardInterrupt
@@ -111,8 +110,13 @@ def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
 def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path, monkeypatch):
     path, result, computed = tmp_path / "x.run.sqlite", Run.result, []
 
-    def counted(run, stage, given, compute):
-        value = result(run, stage, given, lambda: (computed.append(stage), compute())[1])
+    def counted(run, stage, arguments):
+        @functools.wraps(stage)
+        def compute(*arguments):
+            computed.append(stage.__name__)
+            return stage(*arguments)
+
+        value = result(run, compute, arguments)
         if len(computed) - stops[-1] == 5:
             stops.append(len(computed))
             raise KeyboardInterrupt
@@ -125,7 +129,7 @@ def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path
     assert len(stops) > 3
     np.testing.assert_array_equal(found.answer.x, wanted.answer.x)
     rows = [key.split(" ")[0] for key in read_rows(path, ROWS)]
-    for stage in ("optimise", "_confirm", "_certificate"):
+    for stage in ("optimise", "confirm", "_certificate"):
         assert computed.count(stage) == rows.count(stage) > 0
 
 
@@ -147,8 +151,8 @@ def test_every_stage_makes_the_value_of_the_next_one_and_together_they_are_a_sol
     assert optimum.optimal
     answer = confirm(optimum)
     assert answer.optimal
-    certificate = certify(answer)
-    chosen = choose(QUICK, [solution_of(QUICK, answer, certificate)])
+    chosen = choose(QUICK, [certify_answer(QUICK, answer)])
+    assert chosen.certificate == certify(answer)
     np.testing.assert_array_equal(chosen.answer.x, solution.answer.x)
     assert (chosen.value, chosen.status) == (solution.value, solution.status)
     assert [step.delta for step in answer.history] == [step.delta for step in solution.history]
@@ -158,12 +162,12 @@ def test_every_stage_makes_the_value_of_the_next_one_and_together_they_are_a_sol
 def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_be(shrinking):
     found = solve(QUICK.with_(delta=1e-3, mesh_tolerance=1e-5), 1)
     assert found.success
-    big = solution_of(found.problem, found.answer, found.certificate)
+    big = found
     tiny = found.gait.scaled(0.01)
     answer = replace(found.answer, gait=tiny, value=1.1 * found.answer.value)
-    small = solution_of(found.problem, answer, found.certificate)
-    assert is_visible_solution(big)
-    assert not is_visible_solution(small)
+    small = replace(found, answer=answer)
+    assert is_visible(big.gait)
+    assert not is_visible(small.gait)
     chosen = choose(found.problem.with_(shrinking=shrinking), [small, big])
     if shrinking:
         assert chosen.answer is small.answer
@@ -175,16 +179,20 @@ def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_b
     assert choose(found.problem, [small]).answer is small.answer
 
 
+def stage(number):
+    return np.arange(3.0), QUICK
+
+
 def test_a_kept_value_that_was_damaged_is_found_anew(tmp_path):
     path = tmp_path / "x.run.sqlite"
     first = Run(path, QUICK)
-    first.result("stage", (1,), lambda: (np.arange(3.0), QUICK))
+    first.result(stage, (1,))
     first.write()
     (key,) = (key for key in read_rows(path, ROWS) if key != "problem")
     for wrong in ({"kind": "Stranger", "of": {}}, {"array": "AAAA", "type": "<f8", "shape": [3]}):
         put_rows(path, ROWS, {key: wrong})
         again = Run(path, QUICK)
-        assert again.result("stage", (1,), lambda: "anew") == "anew"
+        assert again.result(stage, (1,))[1] == QUICK
         assert again.n_reused == 0
 
 

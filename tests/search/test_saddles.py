@@ -7,10 +7,9 @@ from colloc import Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.search.confirm import confirm
-from colloc.search.descend import leave_saddle
-from colloc.search.iterate import evaluate_at
+from colloc.search.iterate import evaluate_at, space_near
+from colloc.search.optimise import leave_saddle
 from colloc.search.solve import finish
-from colloc.search.spaces import space_near
 from tests.shared.stages import optimum_near
 
 PROBLEM = Problem(

@@ -11,8 +11,8 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics.bodies import FULL
 from colloc.reduced.program import ReducedProgram
 from colloc.search.certify import gait_certificate
+from colloc.search.iterate import space_near
 from colloc.search.solve import solve
-from colloc.search.spaces import space_near
 from colloc.verification.differential_motion import slope_motion
 from colloc.verification.mesh_error import mesh_error
 
@@ -36,7 +36,7 @@ def run(body, gait, grade=0.1, **settings):
 def test_the_answer_is_a_certified_solution_of_the_full_program(uphill):
     assert uphill.status == "solved", uphill.message
     assert uphill.answer.program == FULL
-    theta = uphill.answer.x[uphill.layout.theta[0]]
+    theta = uphill.answer.x[uphill.answer.layout.theta[0]]
     assert uphill.gait.theta == pytest.approx(theta[0], abs=1e-9)
     ran = slope_motion(Chain(), Friction(), uphill.gait, 1e-2, 0.1)
     assert uphill.certificate.distance == pytest.approx(ran.climb[0], abs=1e-5)

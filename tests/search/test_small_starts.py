@@ -9,7 +9,6 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Polygon, Problem, Viscous
 from colloc.mechanics.contact import crossing_depth
 from colloc.results.distinct_optima import distance
-from colloc.search.ahead import Ahead
 from colloc.search.explore import multistart
 from colloc.search.small_starts import small_loops
 
@@ -24,8 +23,6 @@ PROBLEMS = {
     ),
     "polygon": Problem("polygon", friction=Friction(mu_t=0.4, mu_f=1, mu_b=2), gait=Polygon(8)),
 }
-
-ALONE = Ahead(Problem("alone"))
 
 
 @pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
@@ -62,7 +59,7 @@ def test_viscous_drag_has_none():
 def test_a_small_gait_at_the_fold_is_found_where_it_is_the_best():
     """Two harmonics, joints up to pi: 0.37 at the fold, 0.35 for gaits of any size."""
     problem = Problem("fold", gait=Harmonic(2))
-    known, _ = multistart(problem, 8, lambda: True, ALONE)
+    known, _ = multistart(problem, 8)
     best = known[0].iterate.gait
     assert -known[0].dry_objective > 0.36
     assert best.shape_speed < 2 * problem.smallest_shape_speed

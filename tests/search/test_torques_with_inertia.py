@@ -18,7 +18,8 @@ from colloc.mechanics.inertia import (
 from colloc.reduced.program import ReducedProgram
 from colloc.results.limit_use import lines
 from colloc.results.robot import joint_torques as sheet_torques
-from colloc.search.spaces import program_of, space_near
+from colloc.search.iterate import space_near
+from tests.shared.stages import program_of
 
 CHAIN = colloc.Chain((0.3, 0.25, 0.45))
 FLOOR = colloc.Friction(mu_t=1.3, mu_f=0.7, mu_b=1.1)

@@ -15,11 +15,10 @@ from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
 from colloc.results.store import load, save
 from colloc.search.confirm import answer_of_iterate
-from colloc.search.converge import optimise
-from colloc.search.iterate import evaluate_at
+from colloc.search.iterate import evaluate_at, space_near
+from colloc.search.optimise import optimise
 from colloc.search.options import COARSE
 from colloc.search.solve import solve
-from colloc.search.spaces import space_near
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.smooth.prescribed_body import Concertina
 from colloc.system.errors import ProblemError

@@ -13,7 +13,6 @@ from colloc.reduced.linear_space import LinearSpace
 from colloc.results.distinct_optima import distance, reversed_in_time, swap_ends
 from colloc.results.store import load, save
 from colloc.search.solve import solve
-from colloc.search.spaces import program_of
 from colloc.smooth.balance import Motion, solve_smooth
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Wave
@@ -21,6 +20,7 @@ from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
 from colloc.transcription.shape_constraints import shape_checks
 from scripts.models.period import measured_period
+from tests.shared.stages import program_of
 
 SIDEWAYS = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
 FOURIER = ModalBody(4, "fourier")

@@ -12,9 +12,9 @@ import pytest
 
 from colloc import Harmonic, Problem, ellipse
 from colloc.search.ipopt import Solver
-from colloc.search.spaces import program_of
 from colloc.system.interruption import clear_interrupt, interrupted, interruptible, time_limit
 from colloc.transcription.velocity_map import BalancedVelocity
+from tests.shared.stages import program_of
 
 
 def pressed(times, seen, **options):

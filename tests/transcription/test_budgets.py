@@ -11,8 +11,8 @@ import pytest
 from colloc import Chain, Harmonic, Problem, ellipse, solve_balance
 from colloc.numerics.multiplier_estimate import least_squares_multipliers, quasi_definite_factors
 from colloc.search.ipopt import Solver
-from colloc.search.spaces import program_of
 from tests.shared.laws import coulomb
+from tests.shared.stages import program_of
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])

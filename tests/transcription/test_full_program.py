@@ -10,11 +10,12 @@ from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Quantity, Whee
 from colloc.mechanics.balance import joint_moments
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver, solve_in_regions
-from colloc.search.spaces import program_of, space_near
+from colloc.search.iterate import space_near
 from colloc.transcription.full_program import ACTUATORS, AT_LEAST, full_program
 from colloc.transcription.layout import RADIANS
 from tests.shared.cases import cases
 from tests.shared.differences import assert_derivatives_are_differences
+from tests.shared.stages import program_of
 
 SKEW = Chain((0.3, 0.25, 0.45))
 ROUGH = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)

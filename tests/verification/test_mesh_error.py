@@ -17,7 +17,7 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.numerics.mesh import Mesh, uniform_mesh
 from colloc.numerics.schemes import scheme
-from colloc.search import refine
+from colloc.search import optimise as refine
 from colloc.search.solve import solve
 from colloc.verification import refinement
 from colloc.verification.adaptive_motion import fine_motion, rates_at
