@@ -196,7 +196,8 @@ class Problem:
         self._set(objective=objective_from(self.objective), at_least=least_values(self.at_least))
         regime, froude = self.regime, self.froude
         start = regime.delta_start(self.gait) or usual.delta_start
-        self._set(froude=Free(*map(float, froude)) if isinstance(froude, (list, tuple)) else froude)
+        paces = isinstance(froude, (list, tuple))
+        self._set(froude=Free(*map(float, froude)) if paces else float(froude))  # type: ignore[arg-type]
         self._fill(
             delta=usual.delta,
             delta_start=start if self.law.regularised else usual.delta,
