@@ -25,7 +25,7 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
-from colloc.numerics.linear_program import linear_maximum
+from colloc.numerics.conic import linear_maximum
 from colloc.system.errors import ProblemError
 
 DELTA, _SAMPLED = 1e-9, 1e-6

@@ -12,11 +12,11 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.numerics.multiplier_estimate import (
+from colloc.numerics.repeated import (
+    as_sparse,
     least_squares_multipliers,
     quasi_definite_factors,
 )
-from colloc.numerics.repeated import as_sparse
 from colloc.numerics.sqp import keep_last
 from colloc.search.options import TOLERANCES
 from colloc.system.interruption import interrupted, interruptible

@@ -25,8 +25,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import Pairs, far_pairs, link_width, overlapping_pairs
-from colloc.numerics.kinks import stationarity_around
-from colloc.numerics.sqp import Stationarity, minimize, stationarity
+from colloc.numerics.sqp import Stationarity, minimize, stationarity, stationarity_around
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
 from colloc.search.checkpoint import active_run, checkpointed

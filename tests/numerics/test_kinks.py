@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc.numerics.kinks import stationarity_around
-from colloc.numerics.sqp import stationarity
+from colloc.numerics.sqp import stationarity, stationarity_around
 
 ZERO = np.zeros(2)
 

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from colloc.numerics.linear_program import linear_maximum
+from colloc.numerics.conic import linear_maximum
 from colloc.numerics.sqp import nonnegative
 from colloc.system.errors import NotConvergedError
 

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from colloc.numerics.quadratic_step import quadratic_step
+from colloc.numerics.conic import quadratic_step
 from colloc.numerics.sqp import minimize, stationarity
 
 

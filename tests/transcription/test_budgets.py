@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Harmonic, Problem, ellipse, solve_balance
-from colloc.numerics.multiplier_estimate import least_squares_multipliers, quasi_definite_factors
+from colloc.numerics.repeated import least_squares_multipliers, quasi_definite_factors
 from colloc.search.ipopt import Solver
 from tests.shared.laws import coulomb
 from tests.shared.stages import program_of
