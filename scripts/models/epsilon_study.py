@@ -7,7 +7,7 @@ The regularisation has to fall with epsilon, because the speeds of the bump do: 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,6 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
 from colloc.smooth.prescribed_body import Concertina
-from colloc.system.errors import ProblemError
 from scripts.models.period import Period, measured_period, period
 
 DELTA_0, EPSILON_0 = 1e-4, 0.2
@@ -31,10 +30,6 @@ class Crawler:
     delta: float = 1e-6
     name: str = "concertina"
 
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.delta) and self.delta > 0):
-            raise ProblemError(f"delta must be positive, not {self.delta!r}.")
-
     @classmethod
     def of(cls, problem: Problem) -> Crawler:
         """The crawler of a problem."""
@@ -44,14 +39,10 @@ class Crawler:
 
     def with_(self, **changes: Any) -> Crawler:
         """A copy with some fields changed, also those of the body."""
-        own = {f.name for f in fields(self)}
-        body = replace(
-            self.body, **{name: value for name, value in changes.items() if name not in own}
-        )
-        return replace(
-            self,
-            **({"body": body} | {name: value for name, value in changes.items() if name in own}),
-        )
+        own = {
+            field.name: changes.pop(field.name) for field in fields(self) if field.name in changes
+        }
+        return replace(self, **({"body": replace(self.body, **changes)} | own))
 
     @property
     def bound(self) -> float:
@@ -60,15 +51,13 @@ class Crawler:
 
     def period(self, **settings: Any) -> Period:
         """Distance and work of one period; settings as for `scripts.models.period.period`."""
-        return period(
-            self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings
-        )
+        settings["regions"] = self.body.regions
+        return period(self.body.prescribed(), self.friction, self.delta, **settings)
 
     def measured_period(self, **settings: Any) -> Period:
         """The same with an error estimate, see `scripts.models.period.measured_period`."""
-        return measured_period(
-            self.body.prescribed(), self.friction, self.delta, regions=self.body.regions, **settings
-        )
+        settings["regions"] = self.body.regions
+        return measured_period(self.body.prescribed(), self.friction, self.delta, **settings)
 
 
 @dataclass(frozen=True)
@@ -84,10 +73,6 @@ class EpsilonPoint:
     efficiency: float
     errors: dict[str, float]
     largest_creep: float
-
-    def to_dict(self) -> dict:
-        """Plain numbers (JSON)."""
-        return asdict(self)
 
 
 def delta_for(epsilon: float, delta_0: float = DELTA_0, epsilon_0: float = EPSILON_0) -> float:
@@ -107,25 +92,14 @@ def epsilon_point(crawler: Crawler, *, intervals: int = 2, **settings: Any) -> E
         intervals=max(1, intervals // 2), **settings
     )
     coarse = crawler.period(intervals=max(1, intervals // 2), **settings)
+    names = {"d": "d", "W_inner": "W_inner", "W_outer": "W", "efficiency": "efficiency"}
     errors = {
         name: float(fine.errors[source] + abs(getattr(softer, name) - getattr(coarse, name)))
-        for name, source in (
-            ("d", "d"),
-            ("W_inner", "W_inner"),
-            ("W_outer", "W"),
-            ("efficiency", "efficiency"),
-        )
+        for name, source in names.items()
     }
-    return EpsilonPoint(
-        crawler.body.epsilon,
-        crawler.delta,
-        fine.d,
-        fine.W_inner,
-        fine.W_outer,
-        fine.efficiency,
-        errors,
-        float(fine.nodes.slowest.max()),
-    )
+    values = fine.d, fine.W_inner, fine.W_outer, fine.efficiency
+    creep = float(fine.nodes.slowest.max())
+    return EpsilonPoint(crawler.body.epsilon, crawler.delta, *values, errors, creep)
 
 
 def fitted_order(epsilon: Any, value: Any) -> float:

@@ -1,5 +1,5 @@
 """Where static friction carries a link of the three-link body, and why kinetic friction alone has
-no solution there.
+no solution there; the paper's flap body.
 
 A link is *held* when the largest speed on it falls below a threshold (the paper's figure 9: 1e-3 at
 unit larger rate and delta = 1e-4). With kinetic friction only, forces per unit length of a held
@@ -15,14 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.balance import Instant, instant, net_force
+from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction, LinkVelocity
 
 SLOW = 1e-3
 """Speed below which the paper counts a link as held (its figure 9)."""
-MIDDLE = 1
+BODY, ISOTROPIC = Chain(), Friction()
+_MIDDLE, _PARENT_OF_FLAPS = 1, 0
+_AROUND_REST = np.array([-1e-9, 0.0, 1e-9])
 
 
 def link_speeds(body: Chain, velocity: LinkVelocity) -> np.ndarray:
@@ -32,62 +34,35 @@ def link_speeds(body: Chain, velocity: LinkVelocity) -> np.ndarray:
 
 
 def slowest_link(
-    body: Chain,
-    friction: Friction,
-    angles: np.ndarray,
-    rates: np.ndarray,
-    z: np.ndarray,
-    delta: float,
+    angles: np.ndarray, rates: np.ndarray, delta: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The largest speed on the slowest link, and which link it is, ``(n_time,)`` each, for tail
-    velocities z."""
-    speeds = link_speeds(body, instant(body, friction, angles, rates, z, delta).velocity)
+    """The largest speed on the slowest link, and which link it is, ``(n_time,)`` each."""
+    z = solve_balance(BODY, ISOTROPIC, angles, rates, delta).require().z
+    speeds = link_speeds(BODY, instant(BODY, ISOTROPIC, angles, rates, z, delta).velocity)
     return speeds.min(axis=0), speeds.argmin(axis=0)
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """A shape and its rates at which a link is held."""
 
     name: str
     angles: tuple[float, float]
     rates: tuple[float, float]
-    what: str
 
 
 WORKED_CASES = (
-    Case(
-        "C",
-        (1.45, 1.68),
-        (1.0, 0.5),
-        "both angles near pi/2: the outer links nearly balance each other",
-    ),
-    Case("D", (2.4, 0.4), (1.0, 0.0), "one joint at rest, the other bent beyond pi/2 and moving"),
-    Case("E", (-2.88, -0.785), (1.0, 0.1), "one joint nearly at rest"),
-    Case("F", (2.9, -2.8), (1.0, -0.5), "angles near pi and -pi"),
+    Case("C", (1.45, 1.68), (1.0, 0.5)),  # near pi/2: the outer links nearly balance each other
+    Case("D", (2.4, 0.4), (1.0, 0.0)),  # a joint at rest, the other bent beyond pi/2 and moving
+    Case("E", (-2.88, -0.785), (1.0, 0.1)),  # a joint nearly at rest
+    Case("F", (2.9, -2.8), (1.0, -0.5)),  # near pi and -pi
 )
 """The paper describes figure 9 C-F in words; these shapes and rates lie in the regions it
 describes."""
 
 SYMMETRIC_CASES = (
-    Case(
-        "A",
-        (1.4, 1.4),
-        (1.0, 1.0),
-        "outer links splayed, mirror images of each other: a small force on the middle link",
-    ),
-    Case(
-        "B",
-        (1.75, 1.75),
-        (1.0, 1.0),
-        "outer links leaning inwards: a small force of the other sign",
-    ),
-    Case(
-        "C",
-        (2.85, -2.85),
-        (1.0, -1.0),
-        "symmetric about the centre: a small couple on the middle link",
-    ),
+    Case("A", (1.4, 1.4), (1.0, 1.0)),  # outer links splayed: a small force on the middle link
+    Case("B", (1.75, 1.75), (1.0, 1.0)),  # leaning inwards: a small force of the other sign
+    Case("C", (2.85, -2.85), (1.0, -1.0)),  # symmetric about the centre: a small couple
 )
 """Figure 10 A-C: symmetric shapes and rates, so that one velocity of the middle link remains
 unknown."""
@@ -96,6 +71,7 @@ unknown."""
 class Held(NamedTuple):
     """What a case gives as delta falls; arrays over delta."""
 
+    z: np.ndarray  # tail velocities (n, 3)
     delta: np.ndarray
     link: int
     speed: np.ndarray
@@ -103,65 +79,39 @@ class Held(NamedTuple):
     couple: np.ndarray
 
 
-def at_rates(
-    body: Chain, friction: Friction, case: Case, delta: float
-) -> tuple[np.ndarray, Instant]:
-    """Tail velocity ``(3, 1)`` and instant of a case at one delta."""
-    angles, rates = np.array(case.angles)[:, None], np.array(case.rates)[:, None]
-    solved = solve_balance(body, friction, angles, rates, delta).require()
-    # seen from the held link, whose speed the tail velocity cannot resolve
-    anchor = int(solved.anchor[0])
-    return solved.z, instant(body, friction, angles, rates, solved.anchor_velocity, delta, anchor)
-
-
-def held_link(
-    body: Chain,
-    friction: Friction,
-    case: Case,
-    deltas: tuple[float, ...] = (1e-4, 1e-6, 1e-8, 1e-10),
-) -> Held:
+def held_link(case: Case, deltas: tuple[float, ...] = (1e-4, 1e-6, 1e-8, 1e-10)) -> Held:
     """The slowest link of a case as delta falls: if it is held, its speed falls like delta and its
     force stays."""
-    rows = []
+    angles, rates, rows = np.array(case.angles)[:, None], np.array(case.rates)[:, None], []
     for delta in deltas:
-        _, now = at_rates(body, friction, case, delta)
-        speeds = link_speeds(body, now.velocity)[:, 0]
+        solved = solve_balance(BODY, ISOTROPIC, angles, rates, delta).require()
+        # seen from the held link, whose speed the tail velocity cannot resolve
+        anchor, velocity = int(solved.anchor[0]), solved.anchor_velocity
+        now = instant(BODY, ISOTROPIC, angles, rates, velocity, delta, anchor)
+        speeds = link_speeds(BODY, now.velocity)[:, 0]
         link = int(np.argmin(speeds))
-        length = body.lengths[link]
-        force = np.hypot(now.force.tangential[link, 0], now.force.normal[link, 0])
-        rows.append(
-            (
-                link,
-                speeds[link],
-                force / length,
-                abs(now.force.couple[link, 0]) / (0.25 * length**2),
-            )
-        )
-    links, speed, density, couple = zip(*rows, strict=True)
-    return Held(np.array(deltas), links[-1], np.array(speed), np.array(density), np.array(couple))
+        length, force = BODY.lengths[link], [part[link, 0] for part in now.force]
+        couple = abs(force[2]) / (0.25 * length**2)
+        rows.append((link, speeds[link], np.hypot(*force[:2]) / length, couple, solved.z[:, 0]))
+    links, speed, density, couple, z = map(np.array, zip(*rows, strict=True))
+    return Held(z, np.array(deltas), int(links[-1]), speed, density, couple)
 
 
-def symmetric_balance(
-    body: Chain, friction: Friction, case: Case, unknown: np.ndarray, delta: float
-) -> np.ndarray:
+def symmetric_balance(case: Case, unknown: np.ndarray, delta: float) -> np.ndarray:
     """What a symmetric case leaves unbalanced when the middle link moves with the one velocity
     symmetry allows.
 
     For equal angles and rates (mirror symmetry) that is the link's normal velocity, and the normal
     net force is returned; for opposite ones (point symmetry) its rotation rate, and the net torque
     about the centre. It falls as `unknown` grows. The other two components vanish."""
-    unknown = np.asarray(unknown, dtype=float)
-    angles, rates = (
-        np.repeat(np.array(pair)[:, None], unknown.size, axis=1)
-        for pair in (case.angles, case.rates)
-    )
+    angles, rates = (np.tile(np.array([pair]).T, unknown.size) for pair in case[1:])
     direction = np.zeros((3, 1))
     if case.angles[0] == case.angles[1]:
         direction[:2, 0] = -np.sin(case.angles[0]), np.cos(case.angles[0])
     else:
         direction[2] = 1.0
     # the rates turn the outer links against the middle one, whose own velocity is the unknown
-    now = instant(body, friction, angles, rates, direction * unknown, delta, MIDDLE)
+    now = instant(BODY, ISOTROPIC, angles, rates, direction * unknown, delta, _MIDDLE)
     return (direction * net_force(now.posture, now.force)).sum(axis=0)
 
 
@@ -187,10 +137,54 @@ class KineticGap(NamedTuple):
         return 2 * self.at_rest / (self.below - self.above)
 
 
-def kinetic_gap(body: Chain, friction: Friction, case: Case) -> KineticGap:
+def kinetic_gap(case: Case) -> KineticGap:
     """The gap of a symmetric case: velocities of 1e-9 with delta = 1e-18, and rest, where the
     kinetic force is zero."""
-    below, rest, above = symmetric_balance(
-        body, friction, case, np.array([-1e-9, 0.0, 1e-9]), 1e-18
-    )
-    return KineticGap(float(below), float(rest), float(above))
+    return KineticGap(*map(float, symmetric_balance(case, _AROUND_REST, 1e-18)))
+
+
+@dataclass(frozen=True)
+class FlapBody(Chain):
+    """The paper's figure 4: a straight body, link 0, with flaps 1 and 2 hinged at its tail that
+    open and close like a pair of wings; "joint angles" are the flaps' angles from it.
+
+    The flaps turn in opposite directions, so the net force is along the body and it can only slide
+    along itself. Its friction is then +-mu per unit length or none, and a shorter pair of flaps
+    cannot balance any of these: kinetic friction has no solution. For one velocity V of the body,
+    with flap force f along it at V = 0 and body length l, the delta-regularised balance
+    ``l V/sqrt(V^2 + delta^2) = f`` gives ``V/delta -> f/sqrt(l^2 - f^2)`` as delta -> 0.
+
+    It is a tree, not a chain. Everything a `Chain` computes follows from which joints turn a link
+    and which links lead to its midpoint, so only these two tables differ.
+    """
+
+    lengths: tuple[float, ...] = (0.8, 0.1, 0.1)
+
+    in_series = False
+
+    def _joint_sum(self, reference: int | None) -> np.ndarray:
+        full = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        return full if reference is None else full - full[reference]
+
+    def weighted_path(self, reference: int | None) -> np.ndarray:
+        full = 0.5 * np.eye(3)
+        return (full if reference is None else full - full[reference]) * self.lengths
+
+
+def flap_motion(opening: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Angles and rates ``(2, n_time)`` of mirror-image flaps opened by `opening` [rad]."""
+    return np.stack([opening, -opening]), np.stack([1 + 0 * opening, -1 + 0 * opening])
+
+
+def axial_force(body: FlapBody, opening: float, V: np.ndarray, delta: float) -> np.ndarray:
+    """Net friction along the body, ``(n,)``, when it slides along itself with velocities V; the
+    others vanish."""
+    z = np.stack([V, 0 * V, 0 * V])
+    angles, rates = flap_motion(np.full(V.size, opening))
+    now = instant(body, ISOTROPIC, angles, rates, z, delta, _PARENT_OF_FLAPS)
+    return net_force(now.posture, now.force)[0]
+
+
+def flap_gap(body: FlapBody, opening: float) -> KineticGap:
+    """Unbalanced axial force under kinetic friction just below rest, at rest and just above."""
+    return KineticGap(*map(float, axial_force(body, opening, _AROUND_REST, 1e-18)))

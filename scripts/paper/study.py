@@ -1,10 +1,9 @@
 """Resumable studies: named parts, each a function from settings to named arrays, computed once and
-kept in HDF5.
+kept in HDF5, on several processes.
 
 A part is finished when its file carries the fingerprint of its settings, of the source text of its
 module and of every colloc or scripts module that one leads to, and of the parts it needs. Change
-any of them, and it is computed again. Modules that only carry numbers about (this one, storing,
-running in parallel) do not count.
+any of them, and it is computed again. This module, which only carries numbers about, does not count.
 """
 
 from __future__ import annotations
@@ -13,18 +12,74 @@ import ast
 import hashlib
 import importlib.util
 import json
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from colloc.system.errors import ProblemError
-from scripts.paper.array_store import read_arrays, read_attribute, write_arrays
+import h5py
+from rich.console import Console
+from rich.progress import track
+
+import colloc
+from colloc.system.environment import versions
+from colloc.system.errors import ProblemError, StoreError
+from colloc.system.store_file import array, attribute, mark, new_file, open_file, put, put_attribute
 
 Arrays = dict[str, Any]
-_CARRIERS = {"scripts.paper.study", "scripts.paper.array_store", "scripts.paper.parallel"}
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+_FORMAT = "colloc arrays", 2
+_PACKAGES = "colloc", "scripts", "problems"
+
+
+def parallel_map(
+    function: Callable[[Task], Result],
+    tasks: Sequence[Task],
+    *,
+    processes: int = 1,
+    label: str = "",
+) -> list[Result]:
+    """``[function(task) for task in tasks]`` on several processes, with a bar on the terminal."""
+    count = min(processes, len(tasks))
+    hidden = not label or not sys.stderr.isatty()
+    bar: Any = {"total": len(tasks), "console": Console(stderr=True), "disable": hidden}
+    if count <= 1:
+        return list(track(map(function, tasks), label, **bar))
+    with ProcessPoolExecutor(count) as pool:
+        each = pool.map(function, tasks, chunksize=max(1, len(tasks) // (8 * count)))
+        return list(track(each, label, **bar))
+
+
+def write_arrays(path: Path, arrays: Arrays, *, units: Mapping[str, str], **about: Any) -> None:
+    """Write arrays (numbers, strings or NumPy arrays by name; "a/b" makes a group) with what
+    describes them."""
+    described = {
+        "command": " ".join(sys.orig_argv[1:]),
+        "versions": versions(),
+        "conventions": (colloc.__doc__ or "").strip(),
+    }
+    with new_file(path) as file:
+        mark(file, *_FORMAT)
+        for key, value in arrays.items():
+            put(file, key, value, units=units.get(key, "1"))
+        for key, value in (described | about).items():
+            text = value if isinstance(value, str | int | float) else json.dumps(value)
+            put_attribute(file, key, text)
+
+
+def read_arrays(path: Path) -> Arrays:
+    """All arrays of a file by name; strings decoded, scalars as NumPy scalars."""
+    names: list[str] = []
+    with open_file(path, *_FORMAT) as file:
+        file.visititems(
+            lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None
+        )
+        return {name: array(file, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -49,37 +104,24 @@ class Part:
     units: Mapping[str, str] = field(default_factory=dict)
 
 
-def _source(module: str) -> str | None:
-    try:
-        spec = importlib.util.find_spec(module)
-    except ModuleNotFoundError:  # a name in a module, not a module
-        return None
-    if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
-        return None
-    return Path(spec.origin).read_text(encoding="utf-8")
-
-
 @cache
-def source_closure(
-    module: str, packages: tuple[str, ...] = ("colloc", "scripts", "problems")
-) -> dict[str, str]:
-    """Source text of a module and of all modules of `packages` it imports, directly or not, by
+def source_closure(module: str) -> dict[str, str]:
+    """Source text of a module and of all modules of the project it imports, directly or not, by
     name."""
     found: dict[str, str] = {}
     todo = [module]
     while todo:
         name = todo.pop()
-        text = _source(name) if name not in found and name not in _CARRIERS else None
-        if text is None:
+        try:
+            spec = importlib.util.find_spec(name) if name not in {*found, __name__} else None
+        except ModuleNotFoundError:  # a name in a module, not a module
+            spec = None
+        if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
             continue
-        found[name] = text
-        for node in ast.walk(ast.parse(text)):
-            if (
-                isinstance(node, ast.ImportFrom)
-                and node.module
-                and node.module.split(".")[0] in packages
-            ):
-                todo += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        found[name] = Path(spec.origin).read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(found[name])):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(_PACKAGES):
+                todo += [str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)]
     return found
 
 
@@ -113,24 +155,20 @@ class PaperStudy:
         part = self.parts[name]
         return {**part.settings, **(part.quick if self.quick else {})}
 
-    def fingerprint(self, name: str) -> str:
-        """SHA-256 of what the part's arrays depend on, as it was when the study was made."""
-        return self._fingerprints[name]
-
     def _fingerprint(self, name: str) -> str:
+        """SHA-256 of what the part's arrays depend on."""
         part = self.parts[name]
-        text = json.dumps(
-            [
-                self.settings(name),
-                sorted(source_closure(part.compute.__module__).items()),
-                [self._fingerprint(need) for need in part.needs],
-            ],
-            sort_keys=True,
-        )
+        sources = sorted(source_closure(part.compute.__module__).items())
+        needs = [self._fingerprint(need) for need in part.needs]
+        text = json.dumps([self.settings(name), sources, needs], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def finished(self, name: str) -> bool:
-        return read_attribute(self.path(name), "fingerprint") == self.fingerprint(name)
+        try:
+            with open_file(self.path(name), *_FORMAT) as file:
+                return attribute(file, "fingerprint") == self._fingerprints[name]
+        except StoreError:
+            return False
 
     def arrays(self, name: str) -> Arrays:
         """The arrays of a part, from its file."""
@@ -138,16 +176,11 @@ class PaperStudy:
 
     def compute(self, name: str, processes: int) -> float:
         """Compute one part and write its file; returns the seconds it took."""
-        part = self.parts[name]
+        part, settings = self.parts[name], self.settings(name)
         needed = {need: self.arrays(need) for need in part.needs}
         start = time.perf_counter()
-        arrays = part.compute(Context(self.settings(name), needed, processes))
+        arrays = part.compute(Context(settings, needed, processes))
         seconds = time.perf_counter() - start
-        attributes = {
-            "fingerprint": self.fingerprint(name),
-            "settings": self.settings(name),
-            "seconds": seconds,
-            "processes": processes,
-        }
-        write_arrays(self.path(name), arrays, units=part.units, attributes=attributes)
+        about = {"fingerprint": self._fingerprints[name], "settings": settings, "seconds": seconds}
+        write_arrays(self.path(name), arrays, units=part.units, processes=processes, **about)
         return seconds

@@ -77,7 +77,7 @@ def test_every_hard_instant_against_the_reference(coefficients, delta):
     assert max(found.values()) < 1e-10 * max(coefficients) / min(coefficients), found
 
 
-@pytest.mark.parametrize("case", [*WORKED_CASES, *SYMMETRIC_CASES], ids=lambda c: f"{c.what[:20]}")
+@pytest.mark.parametrize("case", [*WORKED_CASES, *SYMMETRIC_CASES], ids=lambda c: c.name)
 def test_at_stick_the_velocity_tends_to_its_limit_linearly_in_delta(case):
     angles, rates = np.array(case.angles)[:, None], np.array(case.rates)[:, None]
     z = [

@@ -5,12 +5,9 @@ import pytest
 
 from colloc.system.errors import ProblemError
 from scripts import reproduce_paper
-from scripts.models.motion_record import third_slowest_dips
-from scripts.paper import figures as figures_paper
-from scripts.paper import table as paper_table
-from scripts.paper.parallel import parallel_map
-from scripts.paper.rows import number_row, statement_row
-from scripts.paper.study import Context, PaperStudy, Part, source_closure
+from scripts.paper import figures, rows
+from scripts.paper.study import Context, PaperStudy, Part, parallel_map, source_closure
+from scripts.paper.three_link import third_slowest_dips
 
 
 def _square(context: Context) -> dict:
@@ -46,17 +43,14 @@ def test_parts_are_finished_until_their_inputs_change(tmp_path):
 
 
 def test_source_closure_follows_imports():
-    found = source_closure("scripts.models.sweep")
-    assert {
-        "scripts.models.sweep",
+    found = source_closure("scripts.paper.three_link")
+    led_to = {
         "colloc.mechanics.fixed_point",
         "colloc.mechanics.friction",
-        "scripts.models.velocity_map",
-    } <= found.keys()
-    assert (
-        not {"scripts.paper.figures", "scripts.paper.parallel", "scripts.paper.study"}
-        & found.keys()
-    )
+        "scripts.models.ellipses",
+    }
+    assert led_to <= found.keys()
+    assert not {"scripts.paper.figures", "scripts.paper.study"} & found.keys()
 
 
 def test_parallel_map_keeps_order():
@@ -64,10 +58,10 @@ def test_parallel_map_keeps_order():
 
 
 def test_verdicts():
-    assert number_row("x", "0.259", 0.2594, 0.0, "exact").verdict == "agrees"
-    assert number_row("x", "0.259", 0.2600, 1e-5, "exact").verdict == "printed value -0.4 %"
-    assert number_row("x", "0.259", 0.2600, 6e-4, "rough").verdict == "agrees"
-    assert statement_row("x", "small", "2", holds=False).verdict == "does not hold"
+    assert rows.number("x", "0.259", 0.2594, 0.0, "exact").verdict == "agrees"
+    assert rows.number("x", "0.259", 0.2600, 1e-5, "exact").verdict == "printed value -0.4 %"
+    assert rows.number("x", "0.259", 0.2600, 6e-4, "rough").verdict == "agrees"
+    assert rows.statement("x", "small", "2", holds=False).verdict == "does not hold"
 
 
 def test_dips_of_the_third_slowest_end():
@@ -82,16 +76,8 @@ def test_dips_of_the_third_slowest_end():
 def test_command_line_computes_resumes_and_draws(tmp_path, capsys):
     """Two small parts: computed, then skipped; table and figures written; the rest named as
     missing."""
-    arguments = [
-        "--quick",
-        "--only",
-        "instant",
-        "flap",
-        "--output",
-        str(tmp_path),
-        "--processes",
-        "1",
-    ]
+    arguments = ["--quick", "--only", "instant", "flap", "--processes", "1"]
+    arguments += ["--output", str(tmp_path)]
     assert reproduce_paper.main(arguments) == 0
     assert "flap: computing" in capsys.readouterr().out
     assert reproduce_paper.main(arguments) == 0
@@ -111,8 +97,6 @@ def test_command_line_computes_resumes_and_draws(tmp_path, capsys):
     assert "there is no part 'nothing'" in capsys.readouterr().err
 
 
-def test_every_part_has_rows_and_every_figure_its_parts():
-    study = reproduce_paper.study(reproduce_paper.Path("results"), quick=True)
-    assert set(study.parts) == set(paper_table._ROWS)
-    for _, needs in figures_paper.FIGURES:
-        assert set(needs) <= set(study.parts)
+def test_every_part_has_rows_or_a_figure_and_these_their_parts():
+    parts = set(reproduce_paper.study(reproduce_paper.Path("results"), quick=True).parts)
+    assert parts == {name for _, needs in (*rows._ROWS.items(), *figures.FIGURES) for name in needs}

@@ -5,8 +5,7 @@ import pytest
 
 from colloc.mechanics.friction import Friction
 from colloc.smooth.prescribed_body import Wave
-from scripts.models.period import period
-from scripts.models.smooth_record import snapshots
+from scripts.models.period import period, snapshots
 
 ALONG_EASY = Friction(mu_t=20.0, mu_f=1.0, mu_b=1.0)
 

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction, solve_balance
-from scripts.models.flap import FlapBody, axial_force, flap_gap, flap_motion
 from scripts.models.static_friction import (
     SYMMETRIC_CASES,
     WORKED_CASES,
+    FlapBody,
+    axial_force,
+    flap_gap,
+    flap_motion,
     held_link,
     kinetic_gap,
     link_speeds,
@@ -29,7 +32,7 @@ def test_link_speed_is_the_largest_on_the_link():
 
 @pytest.mark.parametrize("case", WORKED_CASES, ids=lambda c: c.name)
 def test_held_links_creep_at_order_delta_and_bear_part_of_the_friction(case):
-    held = held_link(BODY, ISOTROPIC, case)
+    held = held_link(case)
     ratio = held.speed / held.delta
     assert ratio[-1] < 10
     assert ratio[-1] == pytest.approx(ratio[-2], rel=1e-3)
@@ -41,10 +44,10 @@ def test_held_links_creep_at_order_delta_and_bear_part_of_the_friction(case):
 def test_symmetric_cases_have_no_kinetic_solution(case):
     """The unbalanced force falls with the one velocity that symmetry leaves free, and jumps over
     zero at rest."""
-    gap = kinetic_gap(BODY, ISOTROPIC, case)
+    gap = kinetic_gap(case)
     assert gap.no_solution
     V = np.concatenate([-np.geomspace(1, 1e-8, 60), np.geomspace(1e-8, 1, 60)])
-    unbalanced = symmetric_balance(BODY, ISOTROPIC, case, V, 1e-15)
+    unbalanced = symmetric_balance(case, V, 1e-15)
     assert (np.diff(unbalanced) <= 1e-9).all()
     assert np.abs(unbalanced).min() > 0.9 * min(gap.below, -gap.above)
 
@@ -52,8 +55,8 @@ def test_symmetric_cases_have_no_kinetic_solution(case):
 @pytest.mark.parametrize("case", SYMMETRIC_CASES, ids=lambda c: c.name)
 def test_delta_supplies_the_missing_part(case):
     """The solver, which knows no symmetry, finds the root of the one-velocity balance."""
-    gap = kinetic_gap(BODY, ISOTROPIC, case)
-    held = held_link(BODY, ISOTROPIC, case)
+    gap = kinetic_gap(case)
+    held = held_link(case)
     assert held.link == 1
     if case.name == "C":
         assert held.couple[-1] == pytest.approx(abs(gap.fraction), rel=1e-3)
@@ -67,8 +70,7 @@ def test_delta_supplies_the_missing_part(case):
 def test_regions_lie_where_the_paper_finds_them():
     def held(angles: tuple[float, float], rates: tuple[float, float]) -> tuple[bool, int]:
         a, r = np.array(angles)[:, None], np.array(rates)[:, None]
-        z = solve_balance(BODY, ISOTROPIC, a, r, 1e-4).require().z
-        speed, link = slowest_link(BODY, ISOTROPIC, a, r, z, 1e-4)
+        speed, link = slowest_link(a, r, 1e-4)
         return bool(speed[0] < 1e-3), int(link[0])
 
     assert held((1.6, 1.5), (1.0, 0.9)) == (True, 1)  # C: middle link, both angles near pi/2
@@ -103,17 +105,17 @@ class TestFlapBody:
         zero at rest."""
         V = np.concatenate([-np.geomspace(3, 1e-8, 100), [0.0], np.geomspace(1e-8, 3, 100)])
         for opening in (0.1, 0.7, 1.4):
-            assert flap_gap(self.body, ISOTROPIC, opening, 1.0).no_solution
-            force = axial_force(self.body, ISOTROPIC, opening, 1.0, V, 1e-16)
+            assert flap_gap(self.body, opening).no_solution
+            force = axial_force(self.body, opening, V, 1e-16)
             assert (np.diff(force) <= 1e-10).all()
-            flaps = flap_gap(self.body, ISOTROPIC, opening, 1.0).at_rest
+            flaps = flap_gap(self.body, opening).at_rest
             assert np.abs(force).min() == pytest.approx(abs(flaps), rel=1e-6)
             assert 0 < flaps < 0.2  # shorter than the body, which is 0.8 long
 
     def test_delta_gives_the_limit_law(self):
         opening = np.linspace(0.1, 1.5, 7)
-        fraction = np.array([flap_gap(self.body, ISOTROPIC, o, 1.0).fraction for o in opening])
-        angles, rates = flap_motion(opening, np.ones(7))
+        fraction = np.array([flap_gap(self.body, o).fraction for o in opening])
+        angles, rates = flap_motion(opening)
         errors = []
         for delta in (1e-4, 1e-5):
             z = solve_balance(self.body, ISOTROPIC, angles, rates, delta).require().z

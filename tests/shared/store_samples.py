@@ -11,7 +11,7 @@ from colloc.studies.cell import NAME, Attempt, Visit, append_visits, read_journa
 from colloc.studies.sweep import KIND, VERSION, StudyRun, save_study, study_table
 from colloc.system.row_file import CACHE, put_rows, read_rows
 from colloc.system.store_file import Table, array, attribute, open_file
-from scripts.paper.array_store import read_arrays, write_arrays
+from scripts.paper.study import read_arrays, write_arrays
 
 GAIT = Fourier([0.3, -0.5], [[0.9, 0.2], [0.1, -0.1]], [[0.0, 0.1], [0.8, 0.2]])
 HDF5_KINDS = ("solution", "arrays", "study")
@@ -70,7 +70,8 @@ class Samples:
         elif kind == "archive":
             archive(path.with_suffix(".h5"), range(3 + version))
         elif kind == "arrays":
-            write_arrays(path, {"a/b": np.arange(2000.0) + version, "names": np.array(["d", "W"])})
+            arrays = {"a/b": np.arange(2000.0) + version, "names": np.array(["d", "W"])}
+            write_arrays(path, arrays, units={})
         elif kind == "study":
             save_study(self.table, path, source=str(version) * 10)
         elif kind == "journal":

@@ -144,7 +144,6 @@ def test_problem_files_state_a_crawler(name):
         ({"epsilon": 0.3, "bumps": 2}, "for 2 bump"),
         ({"share": 1.0}, "share must lie"),
         ({"amplitude": 2.0}, "amplitude must lie"),
-        ({"delta": 0.0}, "delta must be positive"),
         ({"bumps": 3}, "bumps must be 1 or 2"),
     ],
 )
