@@ -8,7 +8,6 @@ calls serious. Needs chromium or google-chrome.
 
 from __future__ import annotations
 
-import argparse
 import json
 import shutil
 import subprocess
@@ -20,6 +19,8 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
+from scripts.program import command_line
+
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 OPTIONS = [
     "--headless",
@@ -27,9 +28,9 @@ OPTIONS = [
     "--disable-gpu",
     "--disable-quic",
     "--no-first-run",
+    "--disable-sync",
     "--disable-background-networking",
     "--disable-component-update",
-    "--disable-sync",
     "--hide-scrollbars",
 ]
 DARK = "--blink-settings=preferredColorScheme=0"
@@ -120,27 +121,15 @@ def complaints(program: str, folder: Path, axe: str = "", *, dark: bool = False)
     `TimeoutError` if the browser does not answer."""
     pages = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*.html"))]
     searched = "index.html" if (folder / "search").exists() else ""
-    asked = {
-        "pages": pages,
-        "widths": WIDTHS[:1] if dark and not axe else WIDTHS,
-        "dark": dark,
-        "searched": searched,
-        "axe": axe,
-    }
-    with (
-        _Server(folder) as server,
-        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile,
-    ):
+    widths = WIDTHS[:1] if dark and not axe else WIDTHS
+    asked = {"pages": pages, "widths": widths, "dark": dark, "searched": searched, "axe": axe}
+    profiles = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+    with _Server(folder) as server, profiles as profile:
         server.look = _LOOK.replace("ASKED", json.dumps(asked).replace("</", "<\\/")).encode()
         threading.Thread(target=server.serve_forever, daemon=True).start()
         address = f"http://127.0.0.1:{server.server_address[1]}/look"
-        command = [
-            program,
-            *OPTIONS,
-            *([DARK] if dark else []),
-            f"--user-data-dir={profile}",
-            "--remote-debugging-port=0",
-        ]
+        command = [program, *OPTIONS, *([DARK] if dark else []), f"--user-data-dir={profile}"]
+        command.append("--remote-debugging-port=0")
         opened = subprocess.Popen(
             [*command, address], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
@@ -155,12 +144,7 @@ def complaints(program: str, folder: Path, axe: str = "", *, dark: bool = False)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--axe", type=Path, help="the file axe.min.js of axe-core")
-    options = parser.parse_args()
+    options = command_line(__doc__, ("folder", Path()), axe=Path)
     program = browser()
     if program is None:
         print(f"no browser: install one of {', '.join(BROWSERS)}.", file=sys.stderr)
@@ -171,10 +155,8 @@ def main() -> int:
         for dark in (False, True)
         for line in complaints(program, options.folder, axe, dark=dark)
     ]
-    print(
-        "\n".join(said)
-        or f"nothing is wrong at {', '.join(map(str, WIDTHS))} pixels, light and dark"
-    )
+    nothing = f"nothing is wrong at {', '.join(map(str, WIDTHS))} pixels, light and dark"
+    print("\n".join(said) or nothing)
     return 1 if said else 0
 
 

@@ -1,10 +1,9 @@
 """What kept potentials say: python -m scripts.check_potential [FILE] [--seed 0] [--shapes 60]
-[--directions 120] [--random N]
+[--directions 120] [--starts 1000]
 
 A sampled bound is a potential over shape and heading; `results/curated/potentials.json` keeps the
 best that are known, for three links. The largest ratio of gain to power is looked for on lattices
-and by climbs that know nothing of how it was found, or at random motions: no ratio may exceed what
-is guaranteed.
+and by climbs that know nothing of how it was found: no ratio may exceed what is guaranteed.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import json
 import time
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,9 +22,9 @@ from colloc.bounds.potential import PotentialSpace, TensorSpline
 from colloc.laws.resistance import Elliptic
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
+from scripts.program import command_line
 
 KEPT = Path("results/curated/potentials.json")
-_AT_ONCE = 200_000
 LAWS: dict[str, type[Friction]] = {law.__name__: law for law in (Friction, Elliptic)}
 
 
@@ -69,34 +68,19 @@ def keep(found: Kept, path: Path = KEPT) -> None:
 
 def add_domain(parser: argparse.ArgumentParser, limit: float) -> None:
     """Options that say which body, law and joint limit a bound is for; see `domain_of`."""
-    parser.add_argument(
-        "--lengths",
-        type=float,
-        nargs=3,
-        default=list(Chain().lengths),
-        metavar="L",
-        help="of the links",
-    )
-    parser.add_argument(
-        "--friction", type=float, nargs=3, default=[1.0, 1.0, 1.0], metavar=("MU_T", "MU_F", "MU_B")
-    )
-    parser.add_argument(
-        "--law",
-        choices=LAWS,
-        default="Friction",
-        help="Coulomb friction, or the associated elliptic law",
-    )
+    three: Any = {"type": float, "nargs": 3}
+    lengths, laws = list(Chain().lengths), "Coulomb friction, or the associated elliptic law"
+    mu = ("MU_T", "MU_F", "MU_B")
+    parser.add_argument("--lengths", **three, default=lengths, metavar="L", help="of the links")
+    parser.add_argument("--friction", **three, default=[1.0, 1.0, 1.0], metavar=mu)
+    parser.add_argument("--law", choices=LAWS, default="Friction", help=laws)
     parser.add_argument("--limit", type=float, default=limit, help="of the joint angles")
 
 
 def domain_of(options: argparse.Namespace) -> Domain:
     """What was asked for."""
-    mu_t, mu_f, mu_b = options.friction
-    return Domain(
-        Chain(tuple(options.lengths)),
-        LAWS[options.law](mu_t=mu_t, mu_f=mu_f, mu_b=mu_b),
-        options.limit,
-    )
+    law = LAWS[options.law](**dict(zip(("mu_t", "mu_f", "mu_b"), options.friction, strict=True)))
+    return Domain(Chain(tuple(options.lengths)), law, options.limit)
 
 
 def largest_ratio(
@@ -108,50 +92,18 @@ def largest_ratio(
     return float(reached[best]), summit.take(np.array([best]))
 
 
-def largest_random_ratio(kept: Kept, count: int, seed: int) -> float:
-    """Largest ratio of so many random motions, of all shapes without crossing links and all
-    directions alike."""
-    rng, top, left = np.random.default_rng(seed), 0.0, count
-    while left > 0:
-        angles = rng.uniform(-kept.domain.joint_limit, kept.domain.joint_limit, (2, _AT_ONCE))
-        angles = angles[:, kept.domain.holds(angles)][:, :left]
-        way = rng.uniform(0.0, 2.0 * np.pi, angles[0].shape)
-        motion, _ = kept.domain.motions(angles, np.stack([np.cos(way), np.sin(way)]))
-        top, left = (
-            max(top, kept.space.largest_ratios(kept.free, motion).max()),
-            left - angles.shape[1],
-        )
-    return float(top)
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("file", nargs="?", type=Path, default=KEPT)
-    for name, usual in (("seed", 0), ("shapes", 60), ("directions", 120), ("starts", 1000)):
-        parser.add_argument(f"--{name}", type=int, default=usual)
-    parser.add_argument("--random", type=int, metavar="N", help="so many random motions instead")
-    options = parser.parse_args()
-    settings = {name: getattr(options, name) for name in ("seed", "shapes", "directions", "starts")}
-    for kept in potentials(options.file):
+    usual = {"seed": 0, "shapes": 60, "directions": 120, "starts": 1000}
+    settings = vars(command_line(__doc__, ("file", KEPT), **usual))
+    for kept in potentials(settings.pop("file")):
         domain, begin = kept.domain, time.process_time()
         lengths = ", ".join(f"{length:.4g}" for length in domain.body.lengths)
-        if options.random:
-            found = (
-                f"{largest_random_ratio(kept, options.random, options.seed):.5f} of "
-                f"{options.random} random motions"
-            )
-        else:
-            top, at = largest_ratio(domain, kept.space, kept.free, **settings)
-            found = (
-                f"{top:.5f} at angles {at.angles[:, 0].round(4)}, rates {at.rates[:, 0].round(4)}"
-            )
+        top, at = largest_ratio(domain, kept.space, kept.free, **settings)
         print(
             f"links {lengths}, {domain.friction.label}, limit {domain.joint_limit:.4f}, "
-            f"{kept.space.size} unknowns, program "
-            f"{kept.program:.5f}: largest ratio {found}; {time.process_time() - begin:.0f} s of "
-            f"processor time",
+            f"{kept.space.size} unknowns, program {kept.program:.5f}: largest ratio {top:.5f} at "
+            f"angles {at.angles[:, 0].round(4)}, rates {at.rates[:, 0].round(4)}; "
+            f"{time.process_time() - begin:.0f} s of processor time",
             flush=True,
         )
 

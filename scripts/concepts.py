@@ -7,6 +7,7 @@ when the pictures are made.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -38,7 +39,7 @@ def draw_chain(ax: Axes, ends: np.ndarray, colour: str = INK) -> None:
     ax.plot(*ends[:, -1:], "o", color=colour, ms=9, zorder=3)
 
 
-def body_and_friction(ax: Axes) -> Axes:
+def body_and_friction(ax: Axes) -> None:
     """A body of three links with its joint angles, and the three ways in which a link can slide."""
     angles = np.array([0.9, -0.7])
     ends = np.stack(colloc.Chain().outline(angles[:, None]))[:, :, 0]
@@ -55,37 +56,23 @@ def body_and_friction(ax: Axes) -> Axes:
         ax.text(x, y, f"$q_{joint + 1}$", color=BLUE, ha="center", va="center")
     ax.text(ends[0, 0] - 0.03, ends[1, 0], "tail", ha="right", va="center", color=GREY)
     ax.text(ends[0, -1] + 0.04, ends[1, -1], "head", ha="left", va="center", color=GREY)
-    left = float(ends[0, -1]) + 0.45
-    y = float(ends[1].mean())
+    left, y = float(ends[0, -1]) + 0.45, float(ends[1].mean())
     draw_chain(ax, np.array([[left, left + 1 / 3], [y, y]]))
-    centre = np.array([left + 1 / 6, y])
-    for step, label in (
-        (np.array([0.36, 0]), "forwards: $\\mu_f$"),
-        (np.array([-0.36, 0]), "backwards: $\\mu_b$"),
+    x, arrow = left + 1 / 6, {"arrowstyle": "->", "color": ORANGE, "lw": 2}
+    for dx, dy, label in (
+        (0.36, 0, "forwards: $\\mu_f$"),
+        (-0.36, 0, "backwards: $\\mu_b$"),
+        (0, 0.19, "sideways: $\\mu_t$"),
+        (0, -0.19, ""),
     ):
-        ax.annotate(
-            "",
-            (*(centre + step),),
-            (*(centre + 0.58 * step),),
-            arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 2},
-        )
-        ax.text(centre[0] + step[0], centre[1] - 0.05, label, ha="center", va="top", color=ORANGE)
-    for side in (1, -1):
-        ax.annotate(
-            "",
-            (centre[0], centre[1] + 0.19 * side),
-            (centre[0], centre[1]),
-            arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 2},
-        )
-    ax.text(
-        centre[0], centre[1] + 0.21, "sideways: $\\mu_t$", ha="center", va="bottom", color=ORANGE
-    )
+        ax.annotate("", (x + dx, y + dy), (x + 0.58 * dx, y), arrowprops=arrow)
+        place: Any = {"ha": "center", "va": "bottom" if dy else "top", "color": ORANGE}
+        ax.text(x + dx, y + (dy + 0.02 if dy else -0.05), label, **place)
     ax.set(aspect="equal", xlim=(ends[0, 0] - 0.12, left + 0.72), ylim=(y - 0.3, y + 0.34))
     ax.set_axis_off()
-    return ax
 
 
-def gaits_in_shape_space(ax: Axes, solutions: dict[str, Solution]) -> Axes:
+def gaits_in_shape_space(ax: Axes, solutions: dict[str, Solution]) -> None:
     """The best gait of each class as a closed path in the plane of both joint angles."""
     t = np.linspace(0, 1, 801)
     for name, solution in solutions.items():
@@ -94,10 +81,9 @@ def gaits_in_shape_space(ax: Axes, solutions: dict[str, Solution]) -> Axes:
         ax.plot(*angles, color=colour, label=f"{label}: d/W {solution.measured.efficiency:.3f}")
     ax.set(xlabel="joint angle $q_1$ [rad]", ylabel="joint angle $q_2$ [rad]", aspect="equal")
     ax.legend(loc="lower left", fontsize="small")
-    return ax
 
 
-def bodies_of_a_gait(ax: Axes, solution: Solution, count: int = 6) -> Axes:
+def bodies_of_a_gait(ax: Axes, solution: Solution, count: int = 6) -> None:
     """One period as bodies, evenly spaced in time, each in the place of its own that its column
     gives it."""
     motion = solution.sample(np.linspace(0, 1, count))
@@ -105,26 +91,18 @@ def bodies_of_a_gait(ax: Axes, solution: Solution, count: int = 6) -> Axes:
     for k in range(count):
         row = np.array([[0.0], [-0.62 * k]])
         draw_chain(ax, ends[:, :, k] + row, GREY if k in (0, count - 1) else INK)
-        ax.plot(
-            motion.centre[0, k], motion.centre[1, k] + row[1, 0], "o", color=ORANGE, ms=5, zorder=4
-        )
-        ax.text(
-            ends[0].min() - 0.06,
-            row[1, 0] + motion.centre[1, k],
-            f"t = {k / (count - 1):.1f}",
-            ha="right",
-            va="center",
-        )
+        y = motion.centre[1, k] + row[1, 0]
+        ax.plot(motion.centre[0, k], y, "o", color=ORANGE, ms=5, zorder=4)
+        ax.text(ends[0].min() - 0.06, y, f"t = {k / (count - 1):.1f}", ha="right", va="center")
     for x in motion.centre[0, [0, -1]]:
         ax.axvline(x, color=ORANGE, lw=0.8, ls="--", zorder=1)
     ax.set_title(f"d = {solution.measured.distance:.3f} body lengths")
     ax.set_aspect("equal")
     ax.margins(0.12, 0.05)
     ax.set_axis_off()
-    return ax
 
 
-def smoothed_friction(ax: Axes) -> Axes:
+def smoothed_friction(ax: Axes) -> None:
     """Friction against the speed of sliding, for three values of delta; below its delta each is
     drag."""
     speed = np.linspace(-0.05, 0.05, 1001)
@@ -132,49 +110,40 @@ def smoothed_friction(ax: Axes) -> Axes:
         ax.plot(speed, -speed / np.hypot(speed, delta), color=colour, label=f"δ = {delta:g}")
     ax.set(xlabel="speed of sliding [body lengths a period]", ylabel="friction / (μ x weight)")
     ax.legend()
-    return ax
 
 
-def triangle(size: float) -> colloc.Corners:
-    """Move one joint by `size`, then the other, then both back."""
-    c = _ANGLE
-    return colloc.Corners(np.array([[c + size, c, c], [-c, -c, -c - size]]))
-
-
-def size_and_delta(ax: Axes) -> Axes:
+def size_and_delta(ax: Axes) -> None:
     """Efficiency of triangles of one shape and many sizes, at four values of delta: a smaller one
     moves more slowly."""
-    body, friction = colloc.Chain(), colloc.Friction()
+    c, efficiency = _ANGLE, dict[float, list[float]]()
+    for size in SIZES:  # one joint moves by it, then the other, then both back
+        path = colloc.Corners(np.array([[c + size, c, c], [-c, -c, -c - size]]))
+        how: Any = {"breaks": path.corner_phases, "tolerance": 1e-4}
+        for delta in DELTAS:
+            replay = colloc.replay(colloc.Chain(), colloc.Friction(), path, delta, **how)
+            efficiency.setdefault(delta, []).append(replay.efficiency)
     for delta, colour in DELTAS.items():
-        paths = [triangle(size) for size in SIZES]
-        replays = [
-            colloc.replay(body, friction, path, delta, breaks=path.corner_phases, tolerance=1e-4)
-            for path in paths
-        ]
-        values = [replayed.efficiency for replayed in replays]
-        ax.semilogx(SIZES, values, color=colour, label=f"δ = {delta:g}")
+        ax.semilogx(SIZES, efficiency[delta], color=colour, label=f"δ = {delta:g}")
     ax.axhline(0.4, color=GREY, lw=0.8, ls="--")
     ax.text(SIZES[-1], 0.405, "dry friction, size to 0: 2/5", ha="right", va="bottom", color=GREY)
     ax.set(xlabel="side of the triangle [rad]", ylabel="efficiency d/W", ylim=(0, 0.46))
     ax.legend(loc="lower right")
-    return ax
 
 
 def main() -> None:
     folder = command_line(__doc__, ("folder", ROOT / "results/curated/concepts")).folder
     folder.mkdir(parents=True, exist_ok=True)
     solutions = {name: colloc.solve(ROOT / "problems" / f"{name}.py") for name in CLASSES}
+    sizes = {"body": (6.6, 2.3), "gait": (6.6, 4.4), "delta": (4.6, 2.8), "size": (5, 3.2)}
     with styled():
-        body, gait, delta, size = (
-            Picture(figsize=shape) for shape in ((6.6, 2.3), (6.6, 4.4), (4.6, 2.8), (5, 3.2))
-        )
-        body_and_friction(body.subplots())
-        left, right = gait.subplots(1, 2, width_ratios=(1, 2))
+        figures = {name: Picture(figsize=size) for name, size in sizes.items()}
+        body_and_friction(figures["body"].subplots())
+        left, right = figures["gait"].subplots(1, 2, width_ratios=(1, 2))
         bodies_of_a_gait(left, solutions["three_link"])
         gaits_in_shape_space(right, solutions)
-        smoothed_friction(delta.subplots())
-        size_and_delta(size.subplots())
-    for name, figure in (("body", body), ("gait", gait), ("delta", delta), ("size", size)):
+        smoothed_friction(figures["delta"].subplots())
+        size_and_delta(figures["size"].subplots())
+    for name, figure in figures.items():
         print(*save(figure, folder / name, ("png",)))
 
 

@@ -35,51 +35,16 @@ from latex2mathml.converter import convert
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parents[1]
-ORDER = (
-    ("Start", ("index.md", "concepts.md")),
-    ("Tutorial", ("tutorial.md", "notebook.md", "gallery.md")),
-    (
-        "How to",
-        (
-            *(
-                f"howto/{name}.md"
-                for name in (
-                    "scripts",
-                    "report",
-                    "robot",
-                    "motors",
-                    "pace",
-                    "slopes",
-                    "laws",
-                    "steering",
-                )
-            ),
-            *(
-                f"howto/{name}.md"
-                for name in ("objectives", "check", "sensitivity", "starts", "studies", "cluster")
-            ),
-            *(f"howto/{name}.md" for name in ("own_body", "columns", "own_gait_class", "paper")),
-            "troubleshooting.md",
-        ),
-    ),
-    (
-        "Reference",
-        (
-            "reference.md",
-            "known.md",
-            "limits.md",
-            "commands.md",
-            "api.md",
-            "modules.md",
-            "changelog.md",
-            "cite.md",
-        ),
-    ),
-    (
-        "Explanation",
-        ("theory.md", "search.md", "gait_classes.md", "bound.md", "bodies.md", "smooth_bodies.md"),
-    ),
-)
+ORDER = {
+    "Start": "index concepts",
+    "Tutorial": "tutorial notebook gallery",
+    "How to": """howto/scripts howto/report howto/robot howto/motors howto/pace howto/slopes
+        howto/laws howto/steering howto/objectives howto/check howto/sensitivity howto/starts
+        howto/studies howto/cluster howto/own_body howto/columns howto/own_gait_class howto/paper
+        troubleshooting""",
+    "Reference": "reference known limits commands api modules changelog cite",
+    "Explanation": "theory search gait_classes bound bodies smooth_bodies",
+}
 PICTURES = (".png", ".gif")
 KEPT = (*PICTURES, ".md")
 _MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -97,16 +62,15 @@ _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^):#\s]+)(?:#[^)]*)?\)")
 
 def on_config(config: Any) -> Any:
     """The navigation: named pages in their order, then all others."""
-    present = {
-        path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")
-    } | set(GENERATED)
-    named = {page for _, pages in ORDER for page in pages}
-    nav: list[Any] = [
-        {title: [page for page in pages if page in present]} for title, pages in ORDER
-    ]
-    rest = sorted(present - named)
+    docs = ROOT / "docs"
+    rest = {path.relative_to(docs).as_posix() for path in docs.rglob("*.md")} | set(GENERATED)
+    nav: list[Any] = []
+    for title, names in ORDER.items():
+        pages = [page for name in names.split() if (page := f"{name}.md") in rest]
+        nav.append({title: pages})
+        rest -= set(pages)
     if rest:
-        nav.append({"For developers": rest})
+        nav.append({"For developers": sorted(rest)})
     config["nav"] = nav
     return config
 
@@ -118,13 +82,8 @@ def on_files(files: Any, config: Any) -> Any:
     curated = ROOT / "results/curated"
     for path in sorted(path for path in curated.rglob("*") if path.suffix in KEPT):
         name = f"curated/{path.relative_to(curated).as_posix()}"
-        files.append(
-            File.generated(
-                config,
-                name,
-                content=path.read_bytes() if path.suffix in PICTURES else path.read_text(),
-            )
-        )
+        content = path.read_bytes() if path.suffix in PICTURES else path.read_text()
+        files.append(File.generated(config, name, content=content))
     return files
 
 
@@ -134,14 +93,13 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     formulas: list[str] = []
 
     def mark(display: str) -> Any:
+        block = display == "block"
+
         def replaced(match: re.Match[str]) -> str:
             formula = convert(match[1].strip(), display=display)
-            formulas.append(_SCROLLS.format(formula) if display == "block" else formula)
-            return (
-                f"\n\nFORMULA{len(formulas) - 1}END\n\n"
-                if display == "block"
-                else f"FORMULA{len(formulas) - 1}END"
-            )
+            formulas.append(_SCROLLS.format(formula) if block else formula)
+            name = f"FORMULA{len(formulas) - 1}END"
+            return f"\n\n{name}\n\n" if block else name
 
         return replaced
 
@@ -187,15 +145,14 @@ def gallery_page() -> str:
     shown = [
         path.stem for path in files if (ROOT / f"results/curated/gallery/{path.stem}.png").exists()
     ]
-    cards = "\n".join(
-        f"[![{name}](curated/gallery/{name}.png){{ width=49% }}](#{name})" for name in shown
-    )
     parts = [
         "# Gallery",
         "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest "
-        "tests/commands/test_gallery.py` solves them "
-        "again and holds them against these numbers. Choose a picture for its story.",
-        cards,
+        "tests/commands/test_gallery.py` solves them again and holds them against these numbers. "
+        "Choose a picture for its story.",
+        "\n".join(
+            f"[![{name}](curated/gallery/{name}.png){{ width=49% }}](#{name})" for name in shown
+        ),
     ]
     for path in files:
         source = path.read_text(encoding="utf-8")
@@ -206,10 +163,8 @@ def gallery_page() -> str:
         row = table.get(path.stem)
         if row and "efficiency" in row:
             parts.append(
-                f"Efficiency **{row['efficiency']:.6f}** ± {row['error']:.0e}: d = "
-                f"{row['distance']:.5f} for "
-                f"W = {row['work']:.5f} at δ = {row['delta']:.0e}; {row['status']}, "
-                f"{row['cpu_seconds']:g} s of processor time."
+                "Efficiency **{efficiency:.6f}** ± {error:.0e}: d = {distance:.5f} for W = {work:.5f} "
+                "at δ = {delta:.0e}; {status}, {cpu_seconds:g} s of processor time.".format(**row)
             )
         if rest.strip():
             parts.append(rest.strip("\n"))
@@ -259,10 +214,9 @@ def modules_page() -> str:
     """First lines of all modules."""
     rows = ["| module | holds |", "|---|---|"]
     for path in sorted((ROOT / "colloc").glob("*/[!_]*.py")):
-        first = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition(
-            "\n"
-        )[0]
-        rows.append(f"| `{path.parent.name}.{path.stem}` | {first.replace('|', chr(92) + '|')} |")
+        page = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        first = page.partition("\n")[0].replace("|", r"\|")
+        rows.append(f"| `{path.parent.name}.{path.stem}` | {first} |")
     text = "Imports point down from package to package; `tests/test_layering.py` holds the order."
     return "# Modules\n\n" + text + "\n\n" + "\n".join(rows) + "\n"
 

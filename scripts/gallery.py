@@ -8,13 +8,12 @@ them against these numbers and their own REFERENCE.
 
 from __future__ import annotations
 
-import argparse
 import json
 import runpy
+import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 from PIL import Image
@@ -26,6 +25,7 @@ from colloc.results.solution import Solution
 from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
 from colloc.system.environment import versions
+from scripts.program import command_line
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE, PICTURES = ROOT / "results/curated/gallery.json", ROOT / "results/curated/gallery"
@@ -34,8 +34,7 @@ _SIZE, _RESOLUTION, _COLOURS = (9.0, 3.7), 110, 256
 _COLUMNS, _THUMBNAIL = 2, 620
 
 
-@dataclass(frozen=True)
-class Example:
+class Example(NamedTuple):
     """A problem file: its name, what it states, and how to run it."""
 
     name: str
@@ -48,26 +47,18 @@ class Example:
 
 def examples() -> list[Example]:
     """All files in problems/."""
-    return [Example(path.stem, runpy.run_path(str(path))) for path in _problem_files()]
-
-
-def _problem_files() -> list[Path]:
-    return sorted((ROOT / "problems").glob("[!_]*.py"))
+    files = sorted((ROOT / "problems").glob("[!_]*.py"))
+    return [Example(path.stem, runpy.run_path(str(path))) for path in files]
 
 
 def solved_row(solution: Solution) -> dict[str, Any]:
     """Numbers of a solved problem, by its certificate."""
     certificate = solution.certificate
-    if not certificate.replayed:
-        return {"status": solution.status, "delta": solution.answer.delta}
-    return {
-        "status": solution.status,
-        "efficiency": certificate.efficiency,
-        "error": certificate.efficiency_error,
-        "distance": certificate.distance,
-        "work": certificate.work,
-        "delta": solution.answer.delta,
-    }
+    row: dict[str, Any] = {"status": solution.status, "delta": solution.answer.delta}
+    if certificate.replayed:
+        row |= {"efficiency": certificate.efficiency, "error": certificate.efficiency_error}
+        row |= {"distance": certificate.distance, "work": certificate.work}
+    return row
 
 
 def picture(solution: Solution) -> Figure:
@@ -82,18 +73,9 @@ def picture(solution: Solution) -> Figure:
     return figure
 
 
-def _save(example: Example, solution: Solution) -> None:
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    path = PICTURES / f"{example.name}.png"
-    with styled():
-        picture(solution).savefig(path, dpi=_RESOLUTION)
-    _quantised(Image.open(path)).save(path, optimize=True)
-
-
-def _quantised(image: Image.Image) -> Image.Image:
-    return image.convert("RGB").quantize(
-        _COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
-    )
+def _quantised(path: Path) -> None:
+    how: Any = {"method": Image.Quantize.MEDIANCUT, "dither": Image.Dither.NONE}
+    Image.open(path).convert("RGB").quantize(_COLOURS, **how).save(path, optimize=True)
 
 
 def _sheet() -> None:
@@ -109,37 +91,27 @@ def _sheet() -> None:
         for axes in figure.axes:
             axes.set_axis_off()
         figure.savefig(SHEET)
-    _quantised(Image.open(SHEET)).save(SHEET, optimize=True)
+    _quantised(SHEET)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    known = [path.stem for path in _problem_files()]
-    parser.add_argument(
-        "names",
-        nargs="*",
-        metavar="NAME",
-        help=f"files to solve (default: all): {', '.join(known)}",
-    )
-    names = parser.parse_args().names
+    names = command_line(__doc__, ("names", [str])).names
+    known = {example.name: example for example in examples()}
     if unknown := set(names) - set(known):
-        parser.error(f"no file in problems/ is called {', '.join(sorted(unknown))}.")
+        sys.exit(f"no file in problems/ is called {', '.join(sorted(unknown))}.")
     table = json.loads(TABLE.read_text()) if TABLE.exists() else {}
-    for example in examples():
-        if names and example.name not in names:
-            continue
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    for example in (known[name] for name in names or known):
         begin = time.process_time()
         solution = solve(example.stated["PROBLEM"], example.stated.get("STARTS", OPTIONS.starts))
-        row = solved_row(solution)
-        row["cpu_seconds"] = round(time.process_time() - begin, 1)
+        row = solved_row(solution) | {"cpu_seconds": round(time.process_time() - begin, 1)}
         table[example.name] = row
-        _save(example, solution)
-        print(
-            f"{example.name:28} {row['status']:20} {row.get('efficiency', float('nan')):10.6f} "
-            f"{row['cpu_seconds']:7.1f} s"
-        )
+        path = PICTURES / f"{example.name}.png"
+        with styled():
+            picture(solution).savefig(path, dpi=_RESOLUTION)
+        _quantised(path)
+        value = row.get("efficiency", float("nan"))
+        print(f"{example.name:28} {row['status']:20} {value:10.6f} {row['cpu_seconds']:7.1f} s")
     table["versions"] = versions()
     _sheet()
     TABLE.write_text(json.dumps(table, indent=1, sort_keys=True) + "\n")

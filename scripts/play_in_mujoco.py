@@ -19,13 +19,13 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 import colloc
-from colloc import Chain, Foot, Problem
+from colloc import Chain, Problem
 from colloc.commands.ending import OK, run
 from colloc.mechanics.inertia import checked_mass
 from colloc.mechanics.law import Law
@@ -65,29 +65,20 @@ class _Points(NamedTuple):
     angle: float = 0.0
 
     @classmethod
-    def of_foot(cls, problem: Problem, body: Chain, foot: Foot) -> _Points:
-        """It, or Gauss points of a pad."""
-        nodes, weights = np.polynomial.legendre.leggauss(POINTS if foot.extent else 1)
-        along, law = (
-            foot.place + 0.5 * foot.extent * nodes[:, None],
-            foot.friction or problem.friction,
-        )
-        weight = 0.5 * weights[:, None] * float(foot.weight or 0.0)
-        return cls(
-            foot.link,
-            along * body.lengths[foot.link],
-            foot.offset + 0 * along,
-            weight,
-            law,
-            foot.angle,
-        )
-
-    @classmethod
-    def of_lines(cls, problem: Problem, body: Chain) -> list[_Points]:
-        """Gauss points of every link."""
+    def under(cls, problem: Problem, body: Chain) -> list[_Points]:
+        """Every foot, Gauss points of pads, or of every link that lies on the floor."""
+        floor, points = body.lengths, []
+        for foot in body.standing_on:
+            nodes, weights = np.polynomial.legendre.leggauss(POINTS if foot.extent else 1)
+            place = foot.place + 0.5 * foot.extent * nodes[:, None]
+            weight, law = float(foot.weight or 0.0), foot.friction or problem.friction
+            at = foot.link, place * floor[foot.link], foot.offset + 0 * place
+            points.append(cls(*at, 0.5 * weights[:, None] * weight, law, foot.angle))
+        if points:
+            return points
         nodes, weights = np.polynomial.legendre.leggauss(POINTS)
         along, shares = 0.5 * (nodes + 1)[:, None], 0.5 * weights[:, None]
-        links = enumerate(zip(body.lengths, body.weight_column()[:, 0], strict=True))
+        links = enumerate(zip(floor, body.weight_column()[:, 0], strict=True))
         return [
             cls(k, length * along, 0 * along, weight * shares, problem.friction)
             for k, (length, weight) in links
@@ -118,10 +109,7 @@ class Played:
         )
         self.model.opt.gravity[:] = 0.0
         self.data = mujoco.MjData(self.model)
-        body = checked_mass(problem.body)
-        self.points = [
-            _Points.of_foot(problem, body, foot) for foot in body.standing_on
-        ] or _Points.of_lines(problem, body)
+        self.points = _Points.under(problem, checked_mass(problem.body))
 
     def _times_mass(self, vector: np.ndarray) -> np.ndarray:
         found = np.zeros(self.model.nv)
@@ -171,15 +159,8 @@ class Played:
 
     def period(self, start: np.ndarray) -> np.ndarray:
         """The state a period later."""
-        found = solve_ivp(
-            self.rates,
-            (0.0, 1.0),
-            start,
-            method="LSODA",
-            rtol=TOLERANCE,
-            atol=TOLERANCE,
-            max_step=0.02,
-        )
+        how: Any = {"method": "LSODA", "rtol": TOLERANCE, "atol": TOLERANCE, "max_step": 0.02}
+        found = solve_ivp(self.rates, (0.0, 1.0), start, **how)
         if not found.success:
             raise RuntimeError(found.message)
         return np.asarray(found.y[:, -1])
@@ -204,13 +185,8 @@ def compared(solution: Solution, froude: float, delta: float = DELTA) -> dict[st
     distance, work = Played(solution, delta, froude).settled()
     own = colloc.inertial_motion(problem.body, problem.friction, solution.gait, delta, froude)
     apart = max(abs(distance / own.distance - 1), abs(work / own.work - 1))
-    return {
-        "distance": distance,
-        "work": work,
-        "own_distance": own.distance,
-        "own_work": own.work,
-        "apart": apart,
-    }
+    found = {"distance": distance, "own_distance": own.distance}
+    return found | {"work": work, "own_work": own.work, "apart": apart}
 
 
 def _renderer(model: mujoco.MjModel) -> mujoco.Renderer:
@@ -258,13 +234,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description="Play a gait in MuJoCo beside colloc's own motion."
     )
+    contacts = "also MuJoCo's own contacts, at the last Froude number"
     parser.add_argument("result", help="a result file of a chain")
     parser.add_argument("--froude", type=float, nargs="+", default=FROUDE, metavar="FR")
-    parser.add_argument(
-        "--contacts",
-        action="store_true",
-        help="also MuJoCo's own contacts, at the last Froude number",
-    )
+    parser.add_argument("--contacts", action="store_true", help=contacts)
     parser.add_argument("--film", type=Path, metavar="GIF", help="film of MuJoCo's own contacts")
     return run(parser, _play, arguments)
 
@@ -272,18 +245,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _play(options: argparse.Namespace) -> int:
     solution = colloc.load(options.result)
     print(f"{solution.problem.name}, delta = {DELTA:g}\n")
-    print(
-        "| Froude number | d MuJoCo | d colloc | W MuJoCo | W colloc | apart "
-        "|\n|---|---|---|---|---|---|"
-    )
+    print("| Froude number | d MuJoCo | d colloc | W MuJoCo | W colloc | apart |")
+    print("|---|---|---|---|---|---|")
     for froude in options.froude:
-        f = compared(solution, froude)
-        print(
-            f"| {froude:g} | {f['distance']:.5f} | {f['own_distance']:.5f} | {f['work']:.5f} | "
-            f"{f['own_work']:.5f} "
-            f"| {f['apart']:.1e} |",
-            flush=True,
-        )
+        *values, apart = compared(solution, froude).values()
+        numbers = " | ".join(f"{value:.5f}" for value in values)
+        print(f"| {froude:g} | {numbers} | {apart:.1e} |", flush=True)
     if options.contacts or options.film:
         distance, work = with_contacts(solution, options.froude[-1], options.film)
         said = f"d = {distance:.4f}, W = {work:.4f}, d/W = {distance / work:.4f}"

@@ -36,7 +36,7 @@ from colloc.search.ipopt import (
 from colloc.search.iterate import NOT_STATIONARY, STATIONARY, Iterate, space_near, space_of
 from colloc.search.optimise import delta_levels, with_kink
 from colloc.search.options import COARSE, MEDIUM, OPTIONS, TOLERANCES, max_rounds
-from colloc.transcription.full_program import ACTUATORS, AT_LEAST, FullProgram, full_program
+from colloc.transcription.full_program import ACTUATORS, AT_LEAST, FullProgram
 from colloc.transcription.layout import balanced_variables, distance_and_work, layout_of
 from colloc.verification.refinement import plan_mesh
 
@@ -67,7 +67,7 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
     if IPOPT ended there, within reach of the iterate."""
     space, delta, mesh = iterate.space, iterate.delta, iterate.space.mesh
     reduced, parameters = iterate.program(), space.full_parameters(iterate.v)
-    program = full_program(space.control, parameters, mesh.edges, mesh.scheme.name, space.far)
+    program = FullProgram(space.control, parameters, mesh.edges, mesh.scheme.name, space.far)
     x = program.feasible(parameters, delta)
     program = _with_whole_turns(program, x)
     if reduced.actuators is not None:
@@ -269,7 +269,7 @@ def solve_directly(problem: Problem) -> Answer:
 def _solve_from(
     problem: Problem, parameters: np.ndarray, delta: float, edges: np.ndarray, scheme: str
 ) -> Answer:
-    program = full_program(control_problem(problem), parameters, edges, scheme)
+    program = FullProgram(control_problem(problem), parameters, edges, scheme)
     x = program.feasible(parameters, delta)
     program = _with_whole_turns(program, x)
     # from a guess IPOPT may need five hundred iterations

@@ -58,7 +58,6 @@ from colloc.mechanics.contact import Pairs
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.friction import LinkForce, line_integrals
 from colloc.mechanics.inertia import STATES, turning
-from colloc.numerics.mesh import Mesh
 from colloc.numerics.repeated import Program, Repeated
 from colloc.transcription.layout import RADIANS, balanced_variables, layout_of
 from colloc.transcription.shape_constraints import ShapeLimits
@@ -69,19 +68,6 @@ _Shape = tuple[ca.SX, ca.SX, ca.SX | None]
 """Joint angles, rates and moments of a point."""
 
 
-def full_program(
-    control: ControlProblem,
-    parameters: np.ndarray,
-    edges: np.ndarray | None = None,
-    scheme: str = "",
-    far: Pairs = (),
-) -> FullProgram:
-    """The program on the first mesh, or on given edges and scheme, with path constraints at the
-    worst instants of a gait and pairs of links `far` kept from crossing."""
-    kind = _Links if control.formulation == FULL else _Mapped
-    return kind(control, control.mesh(edges, scheme), parameters, far)
-
-
 class FullProgram(Program):
     """A nonlinear program ``min f(x), lower <= x <= upper, row_lower <= g(x) <= row_upper``;
     `groups` are the rows of a name, `cells` the mesh cells of a path constraint."""
@@ -89,13 +75,20 @@ class FullProgram(Program):
     velocity: BalancedVelocity | None = None
 
     def __init__(
-        self, control: ControlProblem, mesh: Mesh, parameters: np.ndarray, far: Pairs
+        self,
+        control: ControlProblem,
+        parameters: np.ndarray,
+        edges: np.ndarray | None = None,
+        scheme: str = "",
+        far: Pairs = (),
     ) -> None:
-        self.control, self.mesh, self.far = control, mesh, far
+        """On the first mesh, or on given edges and scheme, with path constraints at the worst
+        instants of a gait and pairs of links `far` kept from crossing."""
+        self.control, self.mesh, self.far = control, control.mesh(edges, scheme), far
+        mesh = self.mesh
         self.layout = layout = layout_of(control, mesh)
-        self.limits = limits = ShapeLimits(
-            control, mesh, layout, parameters[: len(layout.parameters)], far
-        )
+        shape = parameters[: len(layout.parameters)]
+        self.limits = limits = ShapeLimits(control, mesh, layout, shape, far)
         super().__init__(layout.n + limits.n_bend)
         self.dynamics, admissible = control.dynamics.in_speeds_of(RADIANS), control.admissible
         aims, gaits, n_joint = control.aims, admissible.gait, admissible.n_joint
@@ -107,7 +100,7 @@ class FullProgram(Program):
         if self.relative and self.dynamics.turn:
             shares, rates = gaits.side_rates(n_joint)
             self.sides = self.repeat(partial(_lengths_of_sides, shares, rates), [p])
-        self.functions()
+        (self._functions_of_links if control.formulation == FULL else self._function_of_body)()
         objectives = aims.objective, *dict(aims.at_least)
         names = sorted({name for aim in objectives for name in aim.uses})
 
@@ -135,8 +128,8 @@ class FullProgram(Program):
             members = self.repeat(deviation, [p])
         crossing = limits.repeat(self)
         actuators = control.actuators
-        shares_used = self.at_points(actuators) if actuators.names else None
-        densities = [self.at_points(quantity) for quantity in aims.integrals]
+        shares_used = self._at_points(actuators) if actuators.names else None
+        densities = [self._at_points(quantity) for quantity in aims.integrals]
 
         # the gait, links, friction and balance
         matrices = gaits.angle_matrix(mesh.times, n_joint), gaits.rates_on(mesh, n_joint) / RADIANS
@@ -144,7 +137,7 @@ class FullProgram(Program):
             sparse.csr_matrix(matrix.transpose(1, 0, 2).reshape(-1, matrix.shape[2])) @ pick(p)
             for matrix in matrices  # (joint, point), as index arrays are picked
         )
-        self.equations(angles, rates, np.repeat(gaits.offset(n_joint)[:, 0], mesh.n_point))
+        self._add_motion(angles, rates, np.repeat(gaits.offset(n_joint)[:, 0], mesh.n_point))
 
         # what grows along the mesh, and the boundary
         sign, theta = closing_sign(aims.closing), pick(layout.theta[0])
@@ -153,7 +146,7 @@ class FullProgram(Program):
         if "theta" in self.dynamics.states:
             self.add("heading", theta[0] - pick(layout.static[-1]))
         state, rate = mesh.quadrature()
-        ahead, aside, power = self.ways()
+        ahead, aside, power = self._ways()
         self.add("distance", state @ pick(layout.distance) - RADIANS * rate @ ahead)
         self.add("work", state @ pick(layout.work) - RADIANS * rate @ power)
         integral = sparse.csr_matrix(rate.sum(axis=0))
@@ -179,107 +172,14 @@ class FullProgram(Program):
         decisions = layout.decisions
         self.lower[decisions], self.upper[decisions] = admissible.bounds()
         if layout.friction.size:
-            most = self.dynamics.body.contact.largest_forces(control.dynamics.law)  # type: ignore[attr-defined]
+            most = self.chain.contact.largest_forces(control.dynamics.law)
             self.lower[layout.friction], self.upper[layout.friction] = -most, most
         for total in (layout.distance, layout.work):
             self.lower[total[0, 0]] = self.upper[total[0, 0]] = 0.0
 
-    def functions(self) -> None:
-        """Add the functions of a link or a point."""
-        raise NotImplementedError
-
-    def shape(self, with_moments: bool) -> tuple[list[np.ndarray], Callable[..., _Shape]]:
-        """Variables of a point, and its shape from them."""
-        raise NotImplementedError
-
-    def equations(self, angles: Any, rates: Any, offset: np.ndarray) -> None:
-        """Add the equations of motion of a gait with such angles, but for the offset, and rates."""
-        raise NotImplementedError
-
-    def ways(self) -> tuple[Any, Any, Any]:
-        """Rows of the velocities ahead and across, and of the power, at the points."""
-        raise NotImplementedError
-
-    def at_points(self, formula: Any) -> np.ndarray:
-        """Values of a formula at every point, ``(n_value, n_point)``."""
-        variables, shape = self.shape(formula.needs_forces)
-
-        def value(*local: ca.SX) -> ca.SX:
-            q, r, moments = shape(*local)
-            slow = self.delta * ca.norm_2(r) if self.relative else self.delta
-            now = self.dynamics
-            how: Any = {"unit": RADIANS, "moments": moments, "joint_map": now.joint_map}
-            return formula.at(Instants(now.body, now.law, q, r, slow, **how))
-
-        return self.repeat(value, variables)
-
-    def add_orientation(self, spin: np.ndarray) -> None:
-        """theta' = w_0, less the turning of the axes."""
-        mesh, turn, (state, rate) = self.mesh, self.dynamics.turn, self.mesh.integration()
-        rows = state @ self.pick(self.layout.theta) - RADIANS * rate @ self.pick(spin)
-        if self.relative and turn:  # the axes turn evenly along the path
-            corners = self.control.admissible.gait.pieces
-            side = np.searchsorted(corners, mesh.edges[:-1], side="right") - 1
-            side = np.repeat(side, mesh.scheme.s)
-            share = sparse.diags(turn * corners[-1] / np.diff(corners)[side])
-            self.add("orientation", rows + rate @ share @ self.pick(self.sides[side]))
-            return
-        even = -turn * np.asarray(rate.sum(axis=1)).ravel()
-        self.add("orientation", rows, even, even)
-
-    @property
-    def delta_unit(self) -> float:
-        return 1.0 if self.relative else RADIANS
-
-    def member(self, x: np.ndarray) -> AnyGait:
-        return self.control.admissible.member(x[self.layout.decisions])
-
-    def moved_to(self, x: np.ndarray) -> tuple[FullProgram, np.ndarray]:
-        """The program with path constraints at the worst instants of variables x, and its variables
-        there."""
-        p = x[self.layout.parameters[:, 0]]
-        program = type(self)(self.control, self.mesh, p, self.far)
-        for name in ("rotation", ACTUATORS):
-            if name in self.groups:
-                rows = self.groups[name]
-                program = program.with_bounds(name, self.row_lower[rows], self.row_upper[rows])
-        return program, np.concatenate([x[: self.layout.n], program.limits.bends(p)])
-
-    def with_bounds(self, name: str, lower: np.ndarray, upper: np.ndarray) -> FullProgram:
-        program, rows = copy.copy(self), self.groups[name]
-        program.row_lower, program.row_upper = self.row_lower.copy(), self.row_upper.copy()
-        program.row_lower[rows], program.row_upper[rows] = lower, upper
-        return program
-
-    def feasible(self, parameters: np.ndarray, delta: float) -> np.ndarray:
-        """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
-        motion = balanced_variables(self.control, self.layout, self.mesh, parameters, delta)
-        shape = parameters[: len(self.layout.parameters)]
-        return np.concatenate([motion, self.limits.bends(shape)])
-
-
-def _lengths_of_sides(shares: np.ndarray, rates: np.ndarray, p: ca.SX) -> ca.SX:
-    """Length of every side of a polygon over that of all."""
-    sides = zip(shares, rates, strict=True)
-    lengths = ca.vertcat(*(share * ca.norm_2(ca.DM(each) @ p) for share, each in sides))
-    return lengths / ca.sum1(lengths)
-
-
-def _square_of_speed(gaits: AnyClass, n_joint: int, p: ca.SX) -> ca.SX:
-    """Square of the root-mean-square shape speed, or of the mean one where the pace does not
-    matter."""
-    if not gaits.relative_delta:
-        return ca.bilin(ca.DM(gaits.mean_square_rate(n_joint) / RADIANS**2), p, p)
-    shares, rates = gaits.side_rates(n_joint)
-    sides = zip(shares, rates / RADIANS, strict=True)
-    return sum(share * ca.norm_2(ca.DM(each) @ p) for share, each in sides) ** 2
-
-
-class _Links(FullProgram):
-    """A chain, link by link. Parts (links, joints or contacts) come one after the other, each at
-    all points."""
-
-    def functions(self) -> None:
+    def _functions_of_links(self) -> None:
+        """Add the functions of a link, a contact or a joint. Parts come one after the other, each
+        at all points."""
         chain: Any = self.dynamics.body
         self.chain, layout = chain, self.layout
         inertial, lengths = bool(layout.momenta.size), chain.length_column()
@@ -393,8 +293,35 @@ class _Links(FullProgram):
         """Froude number for time in radians."""
         return (ca.exp(-2.0 * pace) if pace.size1() else self.dynamics.regime.froude) * RADIANS**2
 
-    def shape(self, with_moments: bool) -> tuple[list[np.ndarray], Callable[..., _Shape]]:
+    def _function_of_body(self) -> None:
+        """Add the velocity map at the points."""
+        layout, body, law = self.layout, self.dynamics.body, self.dynamics.law
+        self.velocity = BalancedVelocity(body, law, self.mesh.n_point)
+        theta = layout.theta[:, self.sites]
+        gather = np.concatenate([theta, layout.angles, layout.rates, layout.z])
+        values = np.empty((0, self.mesh.n_point))
+        solve = partial(self.velocity.of_local, relative=self.relative)
+        function = velocity_map(body, law, relative=self.relative)
+        self.point = self.add_repeated(Repeated(function, gather, values, solve))
+
+    def _at_points(self, formula: Any) -> np.ndarray:
+        """Values of a formula at every point, ``(n_value, n_point)``."""
+        variables, shape = self._shape(formula.needs_forces)
+
+        def value(*local: ca.SX) -> ca.SX:
+            q, r, moments = shape(*local)
+            slow = self.delta * ca.norm_2(r) if self.relative else self.delta
+            now = self.dynamics
+            how: Any = {"unit": RADIANS, "moments": moments, "joint_map": now.joint_map}
+            return formula.at(Instants(now.body, now.law, q, r, slow, **how))
+
+        return self.repeat(value, variables)
+
+    def _shape(self, with_moments: bool) -> tuple[list[np.ndarray], Callable[..., _Shape]]:
+        """Variables of a point, and its joint angles, rates and moments from them."""
         layout = self.layout
+        if layout.z.size:
+            return [layout.angles, layout.rates], lambda q, r: (q, r, None)
         links = [layout.directions, layout.spins]
         if not with_moments:
             return links, lambda phi, w: (ca.diff(phi), ca.diff(w), None)
@@ -409,7 +336,7 @@ class _Links(FullProgram):
 
         return [*links, layout.accelerations, *self._momenta_and_pace()], shape
 
-    def _at_points(self, matrix: np.ndarray) -> sparse.csr_matrix:
+    def _spread(self, matrix: np.ndarray) -> sparse.csr_matrix:
         """A matrix over parts, applied at every point."""
         return sparse.csr_matrix(sparse.kron(matrix, sparse.eye(self.mesh.n_point)))
 
@@ -418,14 +345,22 @@ class _Links(FullProgram):
         links, total = np.array(self.chain.contact.links), 0
         for rows, outputs in self.contacts:
             to_links = 1.0 * (links[rows] == np.arange(self.chain.n_link)[:, None])
-            total = total + self._at_points(to_links) @ self.pick(outputs[output])
+            total = total + self._spread(to_links) @ self.pick(outputs[output])
         return total
 
-    def equations(self, angles: Any, rates: Any, offset: np.ndarray) -> None:
-        layout, pick, n_link = self.layout, self.pick, self.chain.n_link
+    def _add_motion(self, angles: Any, rates: Any, offset: np.ndarray) -> None:
+        """The equations of a gait with such angles, but for the offset, and rates."""
+        layout, pick = self.layout, self.pick
+        if layout.z.size:
+            self.add("angles", pick(layout.angles) - angles, offset, offset)
+            self.add("rates", pick(layout.rates) - rates)
+            self.add("balance", pick(self.point[:3]))
+            self._add_orientation(layout.z[2])
+            return
+        n_link = self.chain.n_link
         phi, w, vx, vy = map(pick, (layout.directions, layout.spins, layout.vx, layout.vy))
         difference = np.diff(np.eye(n_link), axis=0)  # of the links at a joint
-        d, both = self._at_points(difference), self._at_points(np.abs(difference))
+        d, both = self._spread(difference), self._spread(np.abs(difference))
         halves = [pick(row) for row in self.halves]
         self.add("tail", phi[: self.mesh.n_point] - pick(layout.theta[0, self.sites]))
         self.add("angles", d @ phi - angles, offset, offset)
@@ -441,26 +376,26 @@ class _Links(FullProgram):
             fx, fy = fx + pick(self.load[0]), fy + pick(self.load[1])
         if layout.momenta.size:
             for axis, place, half in (("x", layout.x, 2), ("y", layout.y, 3)):
-                mass = self._at_points(self.chain.mass_column().T)
+                mass = self._spread(self.chain.mass_column().T)
                 self.add(f"place {axis}", d @ pick(place) - both @ halves[half])
                 self.add(f"centre {axis}", mass @ pick(place))
             self._add_momenta([mass @ vx, mass @ vy], [fx, fy, moment])
         else:
-            up = self._at_points(difference.T)
+            up = self._spread(difference.T)
             self.add("force x", up @ pick(layout.joint_fx) + fx)
             self.add("force y", up @ pick(layout.joint_fy) + fy)
             sides = (np.eye(n_link)[:, k : n_link - 1 + k] for k in (0, 1))
             lever = sum(
-                self._at_points(side) @ pick(each)
+                self._spread(side) @ pick(each)
                 for side, each in zip(sides, self.levers, strict=True)
             )
             self.add("torque", up @ pick(layout.moments) + moment - lever)
-        self.add_orientation(layout.spins[0])
+        self._add_orientation(layout.spins[0])
 
     def _add_momenta(self, velocity: list[Any], loads: list[Any]) -> None:
         """Momenta of the body and what changes them."""
         layout, pick, (state, rate) = self.layout, self.pick, self.mesh.integration()
-        every = self._at_points(np.ones((1, self.chain.n_link)))
+        every = self._spread(np.ones((1, self.chain.n_link)))
         names = ("speed x", "speed y", "force x", "force y", "torque")
         totals = velocity + [every @ load for load in loads]
         for name, row, total in zip(names, layout.centre, totals, strict=True):
@@ -481,38 +416,77 @@ class _Links(FullProgram):
         begin, end = pick(layout.momenta[:, 0]), pick(layout.momenta[:, -1])
         self.add("momenta", end - (begin if image is None else sparse.csr_matrix(image) @ begin))
 
-    def ways(self) -> tuple[Any, Any, Any]:
-        mass, angle = self._at_points(self.chain.mass_column().T), self.dynamics.regime.ahead
+    def _add_orientation(self, spin: np.ndarray) -> None:
+        """theta' = w_0, less the turning of the axes."""
+        mesh, turn, (state, rate) = self.mesh, self.dynamics.turn, self.mesh.integration()
+        rows = state @ self.pick(self.layout.theta) - RADIANS * rate @ self.pick(spin)
+        if self.relative and turn:  # the axes turn evenly along the path
+            corners = self.control.admissible.gait.pieces
+            side = np.searchsorted(corners, mesh.edges[:-1], side="right") - 1
+            side = np.repeat(side, mesh.scheme.s)
+            share = sparse.diags(turn * corners[-1] / np.diff(corners)[side])
+            self.add("orientation", rows + rate @ share @ self.pick(self.sides[side]))
+            return
+        even = -turn * np.asarray(rate.sum(axis=1)).ravel()
+        self.add("orientation", rows, even, even)
+
+    def _ways(self) -> tuple[Any, Any, Any]:
+        """Rows of the velocities ahead and across, and of the power, at the points."""
+        if self.layout.z.size:
+            return tuple(self.pick(self.point[k]) for k in (3, 4, 5))
+        mass, angle = self._spread(self.chain.mass_column().T), self.dynamics.regime.ahead
         vx, vy = mass @ self.pick(self.layout.vx), mass @ self.pick(self.layout.vy)
         c, s = np.cos(angle), np.sin(angle)
         power = self._on_links(3)
         if self.load is not None:  # of the joints
             power = power - self.pick(self.load[2])
-        every = self._at_points(np.ones((1, self.chain.n_link)))
+        every = self._spread(np.ones((1, self.chain.n_link)))
         return c * vx + s * vy, c * vy - s * vx, every @ power
 
+    @property
+    def delta_unit(self) -> float:
+        return 1.0 if self.relative else RADIANS
 
-class _Mapped(FullProgram):
-    """A body whose tail velocity is tied to the one that balances it."""
+    def member(self, x: np.ndarray) -> AnyGait:
+        return self.control.admissible.member(x[self.layout.decisions])
 
-    def functions(self) -> None:
-        layout, body, law = self.layout, self.dynamics.body, self.dynamics.law
-        self.velocity = BalancedVelocity(body, law, self.mesh.n_point)
-        theta = layout.theta[:, self.sites]
-        gather = np.concatenate([theta, layout.angles, layout.rates, layout.z])
-        values = np.empty((0, self.mesh.n_point))
-        solve = partial(self.velocity.of_local, relative=self.relative)
-        function = velocity_map(body, law, relative=self.relative)
-        self.point = self.add_repeated(Repeated(function, gather, values, solve))
+    def moved_to(self, x: np.ndarray) -> tuple[FullProgram, np.ndarray]:
+        """The program with path constraints at the worst instants of variables x, and its variables
+        there."""
+        p = x[self.layout.parameters[:, 0]]
+        mesh = self.mesh
+        program = FullProgram(self.control, p, mesh.edges, mesh.scheme.name, self.far)
+        for name in ("rotation", ACTUATORS):
+            if name in self.groups:
+                rows = self.groups[name]
+                program = program.with_bounds(name, self.row_lower[rows], self.row_upper[rows])
+        return program, np.concatenate([x[: self.layout.n], program.limits.bends(p)])
 
-    def shape(self, with_moments: bool) -> tuple[list[np.ndarray], Callable[..., _Shape]]:
-        return [self.layout.angles, self.layout.rates], lambda q, r: (q, r, None)
+    def with_bounds(self, name: str, lower: np.ndarray, upper: np.ndarray) -> FullProgram:
+        program, rows = copy.copy(self), self.groups[name]
+        program.row_lower, program.row_upper = self.row_lower.copy(), self.row_upper.copy()
+        program.row_lower[rows], program.row_upper[rows] = lower, upper
+        return program
 
-    def equations(self, angles: Any, rates: Any, offset: np.ndarray) -> None:
-        self.add("angles", self.pick(self.layout.angles) - angles, offset, offset)
-        self.add("rates", self.pick(self.layout.rates) - rates)
-        self.add("balance", self.pick(self.point[:3]))
-        self.add_orientation(self.layout.z[2])
+    def feasible(self, parameters: np.ndarray, delta: float) -> np.ndarray:
+        """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
+        motion = balanced_variables(self.control, self.layout, self.mesh, parameters, delta)
+        shape = parameters[: len(self.layout.parameters)]
+        return np.concatenate([motion, self.limits.bends(shape)])
 
-    def ways(self) -> tuple[Any, Any, Any]:
-        return tuple(self.pick(self.point[k]) for k in (3, 4, 5))
+
+def _lengths_of_sides(shares: np.ndarray, rates: np.ndarray, p: ca.SX) -> ca.SX:
+    """Length of every side of a polygon over that of all."""
+    sides = zip(shares, rates, strict=True)
+    lengths = ca.vertcat(*(share * ca.norm_2(ca.DM(each) @ p) for share, each in sides))
+    return lengths / ca.sum1(lengths)
+
+
+def _square_of_speed(gaits: AnyClass, n_joint: int, p: ca.SX) -> ca.SX:
+    """Square of the root-mean-square shape speed, or of the mean one where the pace does not
+    matter."""
+    if not gaits.relative_delta:
+        return ca.bilin(ca.DM(gaits.mean_square_rate(n_joint) / RADIANS**2), p, p)
+    shares, rates = gaits.side_rates(n_joint)
+    sides = zip(shares, rates / RADIANS, strict=True)
+    return sum(share * ca.norm_2(ca.DM(each) @ p) for share, each in sides) ** 2

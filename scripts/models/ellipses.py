@@ -29,8 +29,8 @@ from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.verification.replay import replay
 from colloc.verification.adaptive_motion import Replay
+from colloc.verification.replay import replay
 from scripts.paper.study import parallel_map
 
 BODY, ISOTROPIC = Chain(), Friction()

@@ -12,7 +12,7 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.smooth.prescribed_body import Wave
 from problems import concertina, concertina_anisotropic
-from scripts.models.epsilon_study import (
+from scripts.continue_epsilon import (
     Crawler,
     EpsilonPoint,
     delta_for,

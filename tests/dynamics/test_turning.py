@@ -10,7 +10,7 @@ from colloc.gaits.gait import delta_per_period
 from colloc.reduced.program import ReducedProgram
 from colloc.results.motion import arc
 from colloc.search.iterate import space_near
-from colloc.transcription.full_program import full_program
+from colloc.transcription.full_program import FullProgram
 from colloc.verification.differential_motion import inertial_replay
 from colloc.verification.mesh_error import mesh_error
 from tests.shared.cases import cases
@@ -128,7 +128,7 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     values = program.motion.values(v, delta)
     assert values["rotation"] == pytest.approx(turn, abs=1e-12)
 
-    full = full_program(space.control, space.full_parameters(v), space.mesh.edges)
+    full = FullProgram(space.control, space.full_parameters(v), space.mesh.edges)
     x, functions = full.feasible(space.full_parameters(v), delta), full.nlp.functions
     at = x, delta / full.delta_unit
     g = np.array(functions["jac_g"](*at)[0]).ravel()

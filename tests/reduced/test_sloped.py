@@ -24,7 +24,7 @@ from colloc.gaits.gait_fields import fields, gait_from
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver
 from colloc.search.iterate import space_near
-from colloc.transcription.full_program import full_program
+from colloc.transcription.full_program import FullProgram
 from colloc.verification.differential_motion import slope_motion
 
 
@@ -132,7 +132,7 @@ def test_gradients_are_the_limit_of_differences(problem, asked):
 def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towards):
     """Every equation but those that the gait has still to be found for: no turn, no way across."""
     program, v = program_at(problem.with_(towards=towards, objective="driven efficiency"), 0.05)
-    full = full_program(
+    full = FullProgram(
         program.space.control, program.space.full_parameters(v), program.space.mesh.edges
     )
     x = full.feasible(program.space.full_parameters(v), 0.05)

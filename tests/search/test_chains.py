@@ -15,7 +15,7 @@ from colloc.mechanics.contact import (
     smooth_minimum,
 )
 from colloc.search.optimise import crossing_pairs, last_free
-from colloc.transcription.full_program import full_program
+from colloc.transcription.full_program import FullProgram
 from tests.shared.stages import program_of
 
 BODIES = [Chain((0.25,) * 4), Chain((0.1, 0.4, 0.2, 0.3)), Chain((0.2,) * 5), Chain((1 / 8,) * 8)]
@@ -97,7 +97,7 @@ def test_constraint_rows_hold_the_clearance_at_the_worst_instant_of_every_cell()
     p = problem.gait.parameters(problem.guess)
     p = p + 0.1 * np.random.default_rng(4).standard_normal(p.size)
     control = control_problem(problem)
-    program = full_program(control, p, far=far)
+    program = FullProgram(control, p, far=far)
     x = program.feasible(p, 0.1)
     value = np.array(program.nlp.functions["jac_g"](x, 0.1)[0]).ravel()
     fine = np.linspace(program.mesh.edges[:-1], program.mesh.edges[1:], 2001)

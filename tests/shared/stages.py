@@ -4,14 +4,14 @@ from colloc.search.explore import first_optimum
 from colloc.search.iterate import space_near
 from colloc.search.optimise import descend, refine
 from colloc.search.solve import confirm_optimum
-from colloc.transcription.full_program import full_program
+from colloc.transcription.full_program import FullProgram
 
 
 def program_of(problem, gait=None):
     """The full program of a problem on its first mesh, in units of friction, with shape limits at
     the worst instants of the member nearest to a gait (by default the guess)."""
     space, v = space_near(problem, problem.guess if gait is None else gait)
-    return full_program(space.control, space.full_parameters(v))
+    return FullProgram(space.control, space.full_parameters(v))
 
 
 def optimum_near(problem):

@@ -53,7 +53,6 @@ from colloc.search.solve import solve
 from colloc.studies import solve as campaign
 from colloc.system.errors import StoreError
 from colloc.verification.replay import replay
-from scripts.continue_delta import resolution_warning, value_at_zero_delta
 from tests.shared.laws import coulomb
 from tests.shared.stages import answer_near
 
@@ -352,11 +351,17 @@ def test_of_two_runs_at_once_with_other_seeds_or_problems_neither_overwrites_the
     assert len(open_archive(problem(), path).outcomes) == 6
 
 
-def test_the_limit_of_small_delta_agrees_with_a_smaller_delta(three_link):
-    limit = value_at_zero_delta(three_link)
-    assert limit.error < 1e-3 * limit.value
-    assert abs(limit.value - three_link.certificate.efficiency_at_zero_delta) < 3 * limit.error
-    assert resolution_warning(three_link) is None
+def test_the_limit_of_small_delta_is_where_the_levels_of_the_continuation_lead(three_link):
+    """Regularisation acts like c delta at leading order."""
+    first: dict[float, float] = {}
+    for level in three_link.history:
+        if level.optimal:
+            first.setdefault(level.delta, level.value)
+    (small, value), (larger, other) = sorted(first.items())[:2]
+    move = small * (value - other) / (larger - small)
+    assert abs(move) < 1e-3 * value
+    limit = three_link.certificate.efficiency_at_zero_delta
+    assert abs(three_link.value + move - limit) < 3 * abs(move)
 
 
 class _Enough(Exception):

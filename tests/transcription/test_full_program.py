@@ -11,7 +11,7 @@ from colloc.mechanics.balance import joint_moments
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver, solve_in_regions
 from colloc.search.iterate import space_near
-from colloc.transcription.full_program import ACTUATORS, AT_LEAST, full_program
+from colloc.transcription.full_program import ACTUATORS, AT_LEAST, FullProgram
 from colloc.transcription.layout import RADIANS
 from tests.shared.cases import cases
 from tests.shared.differences import assert_derivatives_are_differences
@@ -82,7 +82,7 @@ def at_guess(problem, delta=0.1):
     space, v = space_near(problem, problem.guess)
     reduced = ReducedProgram(space, delta)
     reduced.place_rows(v)
-    full = full_program(space.control, space.full_parameters(v))
+    full = FullProgram(space.control, space.full_parameters(v))
     return full, full.feasible(space.full_parameters(v), delta), reduced, v
 
 
