@@ -105,16 +105,15 @@ class FullProgram(Program):
         names = sorted({name for aim in objectives for name in aim.uses})
 
         def period(*parts: ca.SX) -> ca.SX:
-            totals = {
-                name: part / admissible.fraction for name, part in zip(names, parts, strict=True)
-            }
+            totals, fraction, turn = {}, admissible.fraction, self.dynamics.turn
             for name, part in zip(names, parts, strict=True):
-                if name == "distance":
-                    totals[name] = chord_per_way(self.dynamics.turn) * part / admissible.fraction
-                elif name == "rotation":
-                    totals[name] = part[0] - part[1] + self.dynamics.turn
+                if name == "rotation":
+                    totals[name] = part[0] - part[1] + turn
                 elif name == "period":
                     totals[name] = ca.exp(part)
+                else:
+                    chord = chord_per_way(turn) * part if name == "distance" else part
+                    totals[name] = chord / fraction
             return ca.vertcat(*(aim(totals) for aim in objectives))
 
         of_period = self.repeat(period, [layout.total(name)[:, None] for name in names])
