@@ -21,6 +21,7 @@ from colloc.transcription.shape_constraints import (
     moving,
     near_peaks,
     shape_checks,
+    shape_support,
 )
 
 _TURNS = 0.25 * np.pi * np.array([0, 1, -1, 2, -2, 3, -3])
@@ -44,6 +45,7 @@ class LinearSpace(SearchSpace):
         speeds, joint_map = control.admissible.largest_speeds, control.dynamics.joint_map
         self.checks = shape_checks(control.dynamics.body, far, speeds, joint_map)
         self._offset = self._gaits.offset(n_joint)
+        self._support = shape_support(self._gaits, self.mesh, n_joint)
         angles = self._gaits.angle_matrix(self.mesh.times, n_joint)
         self._matrix = np.concatenate([angles, self._gaits.rates_on(self.mesh, n_joint)], axis=1)
         self._pace = np.ones(self.mesh.n_point)
@@ -139,7 +141,7 @@ class LinearSpace(SearchSpace):
             if not cells.size:
                 continue
             times = times + later * self.mesh.h[cells]
-            each = Placed.at(check, cells, times, self._gaits, gait)
+            each = Placed.at(check, cells, times, self._gaits, gait, self._support)
             values = check.along(check.of(gait, times))
             placed.append((each, moving(each, values, limit, self.mesh)))
             excess = max(excess, float(check.excess(values, limit).max()))
@@ -184,9 +186,6 @@ class LinearSpace(SearchSpace):
         for each, which in placed:
             if which.size:
                 worst = following_instants(each, which, gait, self.mesh, self._limit)
-                matrix = each.matrix.copy()
-                n_joint = self.control.admissible.n_joint
-                matrix[which] = each.check.matrix(self._gaits, worst, n_joint)
-                each = each._replace(matrix=matrix)
+                each = each.moved(which, worst, self._gaits)
             found.append(each)
         return found

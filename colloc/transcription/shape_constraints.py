@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -87,44 +87,80 @@ class ShapeCheck:
         """Shapes of a gait, or their rates, ``(n_joint, n_time)``."""
         return np.asarray(gait.rates(times) if self.derivative else gait.angles(times))
 
-    def matrix(self, gaits: Any, times: np.ndarray, n_joint: int) -> np.ndarray:
-        """Parameters of a class to its shapes, or their rates, ``(n_time, n_joint, n)``."""
-        return np.asarray(gaits.angle_matrix(times, n_joint, self.derivative))
+    @cached_property
+    def joints(self) -> list[int]:
+        """Shape coordinates it depends on."""
+        return [int(k) for k in self.slope.sparsity_out(0).row()]
+
+    def matrix(
+        self, gaits: Any, times: np.ndarray, n_joint: int, columns: np.ndarray
+    ) -> np.ndarray:
+        """Some parameters of a class to its shapes, or their rates, ``(n_time, k, m)``."""
+        matrix = gaits.angle_matrix(times, n_joint, self.derivative)
+        return np.asarray(matrix[:, self.joints][:, :, columns])
 
 
 class Placed(NamedTuple):
-    """A check at instants, one in each of some mesh cells; `matrix` ``(n, n_joint, n_parameter)``
-    gives the shapes there."""
+    """A check at instants, one in each of some mesh cells; `matrix` ``(n, k, m)`` takes the m
+    parameters on which it depends to its k shape coordinates there."""
 
     check: ShapeCheck
     cells: np.ndarray
     times: np.ndarray
     shares: np.ndarray
+    columns: np.ndarray
     matrix: np.ndarray
     offset: np.ndarray  # (n_joint, 1)
 
     @classmethod
     def at(
-        cls, check: ShapeCheck, cells: np.ndarray, times: np.ndarray, gaits: Any, gait: AnyGait
-    ) -> Placed:
-        """Near a gait in time of a class."""
-        shapes = check.of(gait, times)
+        cls, check: ShapeCheck, cells: np.ndarray, times: np.ndarray, gaits: Any, gait: AnyGait,
+        support: np.ndarray,
+    ) -> Placed:  # fmt: skip
+        """Near a gait in time of a class; `support` as of `shape_support`."""
+        shapes, columns = check.of(gait, times), np.flatnonzero(support[check.joints].any(axis=0))
         offset = np.zeros((len(shapes), 1)) if check.derivative else gaits.offset(len(shapes))
-        matrix = check.matrix(gaits, times, len(shapes))
-        return cls(check, cells, times, check.share(shapes), matrix, offset)
+        matrix = check.matrix(gaits, times, len(shapes), columns)
+        return cls(check, cells, times, check.share(shapes), columns, matrix, offset)
+
+    def moved(self, which: np.ndarray, times: np.ndarray, gaits: Any) -> Placed:
+        """With some of the instants elsewhere in their cells, but for `times`."""
+        matrix = self.matrix.copy()
+        matrix[which] = self.check.matrix(gaits, times, len(self.offset), self.columns)
+        return self._replace(matrix=matrix)
 
     def shapes(self, v: np.ndarray) -> np.ndarray:
-        return np.asarray((self.matrix @ v).T + self.offset)
+        """Shapes ``(n_joint, n)``, 0 where the check does not depend on them."""
+        joints = self.check.joints
+        at = (self.matrix @ v[self.columns]).T + self.offset[joints]
+        if len(at) == len(self.offset):
+            return at
+        shapes = np.zeros((len(self.offset), self.times.size))
+        shapes[joints] = at
+        return shapes
 
     def value(self, v: np.ndarray) -> np.ndarray:
         return self.check.cut(self.shapes(v), self.shares)[0]
 
     def slope(self, v: np.ndarray) -> np.ndarray:
         """Derivatives along parameters, ``(n, n_parameter)``."""
-        if self.check.row is not None:
-            return self.check.row @ self.matrix
-        slopes = self.check.slope(self.shapes(v), self.shares[None]).full()
-        return np.einsum("jt,tjp->tp", slopes, self.matrix)
+        check, joints = self.check, self.check.joints
+        if check.row is not None:
+            on_columns = check.row[joints] @ self.matrix
+        else:
+            on_shape = check.slope(self.shapes(v), self.shares[None]).full()[joints]
+            on_columns = (on_shape.T[:, None] @ self.matrix)[:, 0]
+        if self.columns.size == v.size:
+            return on_columns
+        slopes = np.zeros((self.times.size, v.size))
+        slopes[:, self.columns] = on_columns
+        return slopes
+
+
+def shape_support(gaits: Any, mesh: Mesh, n_joint: int) -> np.ndarray:
+    """Whether shape coordinates depend on parameters, ``(n_joint, n_parameter)``: with many links
+    matrices of all would fill the memory."""
+    return np.asarray((gaits.angle_matrix(mesh.times, n_joint) != 0).any(axis=0))
 
 
 @lru_cache(maxsize=64)
@@ -291,19 +327,25 @@ class ShapeLimits:
         gait = gaits.trajectory(parameters, body.n_joint)
         checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
         self._p, self._first, self.n_bend = layout.parameters[:, 0], layout.n, 0
-        self._placed = list[tuple[Placed, list[int], np.ndarray]]()
+        self._placed = list[tuple[Placed, np.ndarray]]()
         matrices, offsets = [np.empty((0, self._p.size))], [np.empty(0)]
+        support = shape_support(gaits, mesh, body.n_joint)
         for check, (cells, times) in zip(
             checks, near_peaks(gait, mesh, checks, self._limit), strict=True
         ):
-            each = Placed.at(check, cells, times, gaits, gait)
+            each = Placed.at(check, cells, times, gaits, gait, support)
             linear = check.row is not None or check.place >= 0
-            joints = [] if linear else check.slope.sparsity_out(0).row()
+            joints = [] if linear else check.joints
             places = np.arange(len(joints) * cells.size).reshape(len(joints), cells.size)
-            self._placed.append((each, joints, self._first + self.n_bend + places))
+            self._placed.append((each, self._first + self.n_bend + places))
             self.n_bend += places.size
-            matrices.append(each.matrix[:, joints].transpose(1, 0, 2).reshape(-1, self._p.size))
-            offsets.append(np.repeat(each.offset[joints, 0], cells.size))
+            if joints:
+                matrix = np.zeros((places.size, self._p.size))
+                matrix[:, each.columns] = each.matrix.transpose(1, 0, 2).reshape(
+                    -1, each.columns.size
+                )
+                matrices.append(matrix)
+                offsets.append(np.repeat(each.offset[joints, 0], cells.size))
         self._matrix = sparse.csr_matrix(np.concatenate(matrices))
         self._offset = np.concatenate(offsets)
 
@@ -313,12 +355,12 @@ class ShapeLimits:
     def repeat(self, program: Program) -> dict[str, np.ndarray]:
         """Add the functions of angles; places of their values by the checks' names."""
         values = {}
-        for placed, joints, bends in self._placed:
+        for placed, bends in self._placed:
             if bends.size:
 
-                def value(local: ca.SX, share: Any, of: Placed = placed, on: Any = joints) -> ca.SX:
-                    shape = ca.SX.zeros(of.matrix.shape[1])
-                    shape[on] = local
+                def value(local: ca.SX, share: Any, of: Placed = placed) -> ca.SX:
+                    shape = ca.SX.zeros(len(of.offset))
+                    shape[of.check.joints] = local
                     return of.check.cut(shape, share)
 
                 values[placed.check.name] = program.repeat(value, [bends], [placed.shares])
@@ -330,12 +372,14 @@ class ShapeLimits:
         if self.n_bend:
             bends = program.pick(self._first + np.arange(self.n_bend))
             program.add("bends", bends - self._matrix @ p, self._offset, self._offset)
-        for (check, cells, _, shares, matrix, offset), _, bends in self._placed:
+        still, cells_of = np.zeros(self._p.size), {}
+        for placed, bends in self._placed:
+            check, cells = placed.check, placed.cells
             if cells.size and not bends.size:
-                slopes = check.slope(np.zeros((len(offset), cells.size)), shares[None]).full().T
-                linear = sparse.csr_matrix(np.einsum("tj,tjp->tp", slopes, matrix))
-                rows = linear @ p + program.constant(slopes @ offset[:, 0])
+                linear = sparse.csr_matrix(placed.slope(still))
+                rows = linear @ p + program.constant(placed.value(still))
             else:
                 rows = program.pick(values.get(check.name, cells))
             program.add(check.name, rows, *check.bounds(self._limit))
-        return {placed.check.name: placed.cells for placed, *_ in self._placed}
+            cells_of[check.name] = cells
+        return cells_of
