@@ -45,26 +45,19 @@ class Mesh:
         return times
 
     @property
-    def _stride(self) -> int:
-        return 1 + self.scheme.s - self.scheme.left - self.scheme.right
-
-    @property
     def sites(self) -> np.ndarray:
         """Index of each interval's stages among the sites, ``(n, s)``."""
-        return (
-            np.arange(self.n)[:, None] * self._stride
-            + np.arange(self.scheme.s)
-            + (0 if self.scheme.left else 1)
-        )
+        first = self.edge_sites[:-1, None] + (not self.scheme.left)
+        return first + np.arange(self.scheme.s)
 
     @property
     def edge_sites(self) -> np.ndarray:
         """Index of the edges among the sites, ``(n + 1,)``."""
-        return np.arange(self.n + 1) * self._stride
+        return np.arange(self.n + 1) * (1 + self.scheme.s - self.scheme.left - self.scheme.right)
 
     @property
     def n_site(self) -> int:
-        return self.n * self._stride + 1
+        return int(self.edge_sites[-1]) + 1
 
     def integration(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Matrices (L, Q) of the equations ``L X - Q X' = 0`` of a state at the sites, from its

@@ -73,18 +73,7 @@ class Scheme:
         return 0.5 * tau[:, None] * np.einsum("q,kqj->kj", weights, values)
 
 
-@lru_cache
-def _gauss_rule(s: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.polynomial.legendre.leggauss(s)
-
-
-def _radau_nodes(s: int) -> np.ndarray:
-    # zeros of P_s - P_(s-1), the largest of which is the right end
-    coefficients = np.zeros(s + 1)
-    coefficients[s], coefficients[s - 1] = 1.0, -1.0
-    roots = np.sort(np.polynomial.legendre.Legendre(coefficients).roots().real)
-    roots[-1] = 1.0
-    return 0.5 * (roots + 1.0)
+_gauss_rule = lru_cache(np.polynomial.legendre.leggauss)
 
 
 def scheme(name: str) -> Scheme:
@@ -101,12 +90,15 @@ def scheme(name: str) -> Scheme:
 
 @lru_cache
 def _known_schemes(name: str) -> Scheme | None:
-    if name == "trapezoid":
-        return Scheme(name, np.array([0.0, 1.0]))
-    if name == "hermite-simpson":
-        return Scheme(name, np.array([0.0, 0.5, 1.0]))
+    if name in ("trapezoid", "hermite-simpson"):
+        return Scheme(name, np.linspace(0.0, 1.0, 2 if name == "trapezoid" else 3))
     match = re.fullmatch(r"(gauss|radau)-(\d{1,3})", name)
-    if not match or not 1 <= int(match[2]) <= _LARGEST:
+    if not match or not 1 <= (s := int(match[2])) <= _LARGEST:
         return None
-    s = int(match[2])
-    return Scheme(name, 0.5 * (_gauss_rule(s)[0] + 1.0) if match[1] == "gauss" else _radau_nodes(s))
+    if match[1] == "gauss":
+        return Scheme(name, 0.5 * (_gauss_rule(s)[0] + 1.0))
+    # zeros of P_s - P_(s-1), the largest of which is the right end
+    difference = np.append(np.zeros(s - 1), [-1.0, 1.0])
+    roots = np.sort(np.polynomial.legendre.Legendre(difference).roots().real)
+    roots[-1] = 1.0
+    return Scheme(name, 0.5 * (roots + 1.0))
