@@ -32,37 +32,35 @@ class LocalFunction:
     equations: ca.SX | None = None
 
     @cached_property
-    def derivatives(self) -> tuple[ca.SX, ca.SX, ca.SX]:
-        """Weights ``(n_out, 1)``, sparse Jacobian, upper triangle of the weighted sum's Hessian."""
+    def functions(self) -> tuple[ca.Function, ca.Function, ca.Function, ca.Sparsity, ca.Sparsity]:
+        """Outputs, nonzeros of their Jacobian, those of the upper triangle of the Hessian of their
+        sum with weights; the patterns of these."""
         weight = ca.SX.sym("weight", self.out.shape[0])
-        total = ca.dot(weight, self.out)
+        total, symbols = ca.dot(weight, self.out), [self.local, self.given, self.delta]
         jacobian = ca.jacobian(self.out, self.local)
         if self.solved is None or self.equations is None:
             hessian = ca.hessian(total, self.local)[0]
-            return weight, ca.sparsify(jacobian), ca.sparsify(ca.triu(hessian))
-        # R(z, y) = 0: dz/dy = -R_z^-1 R_y; the Hessian of L is that of L + nu.R along (I, dz/dy),
-        # nu = -R_z^-T L_z
-        z, equations = self.solved, self.equations
-        R_z, R_y = ca.jacobian(equations, z), ca.jacobian(equations, self.local)
-        slope, nu = -ca.solve(R_z, ca.densify(R_y)), ca.SX.sym("nu", z.shape[0])
-        by_row = ca.vertcat(*(ca.jacobian(row, z) for row in ca.vertsplit(self.out)))
-        inner = ca.hessian(total + ca.dot(nu, equations), ca.vertcat(self.local, z))[0]
-        at_nu = -ca.solve(R_z.T, ca.densify(ca.jacobian(total, z).T))
-        frame = ca.vertcat(ca.SX.eye(self.local.shape[0]), slope)
-        hessian = frame.T @ ca.substitute(inner, nu, at_nu) @ frame
-        return weight, ca.sparsify(jacobian + by_row @ slope), ca.sparsify(ca.triu(hessian))
-
-    @cached_property
-    def functions(self) -> tuple[ca.Function, ca.Function, ca.Function]:
-        """Outputs, nonzeros of the Jacobian, and of the Hessian for weights."""
-        weight, jacobian, upper = self.derivatives
-        symbols = [self.local, self.given, self.delta]
-        symbols += [] if self.solved is None else [self.solved]
+        else:
+            # R(z, y) = 0: dz/dy = -R_z^-1 R_y; the Hessian of L is that of L + nu.R along (I,
+            # dz/dy), nu = -R_z^-T L_z
+            z, equations = self.solved, self.equations
+            symbols.append(z)
+            R_z, R_y = ca.jacobian(equations, z), ca.jacobian(equations, self.local)
+            slope, nu = -ca.solve(R_z, ca.densify(R_y)), ca.SX.sym("nu", z.shape[0])
+            by_row = ca.vertcat(*(ca.jacobian(row, z) for row in ca.vertsplit(self.out)))
+            inner = ca.hessian(total + ca.dot(nu, equations), ca.vertcat(self.local, z))[0]
+            at_nu = -ca.solve(R_z.T, ca.densify(ca.jacobian(total, z).T))
+            frame = ca.vertcat(ca.SX.eye(self.local.shape[0]), slope)
+            hessian = frame.T @ ca.substitute(inner, nu, at_nu) @ frame
+            jacobian += by_row @ slope
+        jacobian, upper = ca.sparsify(jacobian), ca.sparsify(ca.triu(hessian))
         nonzeros = [ca.densify(ca.vertcat(*part.nonzeros())) for part in (jacobian, upper)]
         return (
             ca.Function("local", symbols, [ca.densify(self.out)]),
             ca.Function("jacobian", symbols, nonzeros[:1]),
             ca.Function("hessian", [*symbols, weight], nonzeros[1:]),
+            jacobian.sparsity(),
+            upper.sparsity(),
         )
 
 
@@ -166,15 +164,14 @@ class Program:
             arguments = [local, ca.DM(values), ca.repmat(delta, 1, n_instance)]
             arguments += [] if solve is None else [solve(local, delta)]
             own = ca.reshape(weights[start : start + n_out * n_instance], n_out, n_instance)
-            value, slope, curvature = function.functions
+            value, slope, curvature, jacobian, upper = function.functions
             outputs.append(ca.vec(value.map(n_instance)(*arguments)))
             slopes.append(ca.vec(slope.map(n_instance)(*arguments)))
             curvatures.append(ca.vec(curvature.map(n_instance)(*arguments, own)))
-            _, jacobian, upper = function.derivatives
-            row, column = (np.array(k, dtype=int) for k in jacobian.sparsity().get_triplet())
+            row, column = (np.array(k, dtype=int) for k in jacobian.get_triplet())
             out = start + row[:, None] + n_out * np.arange(n_instance)
             jac_places.append((out, gather[column], np.ones(out.shape)))
-            row, column = (np.array(k, dtype=int) for k in upper.sparsity().get_triplet())
+            row, column = (np.array(k, dtype=int) for k in upper.get_triplet())
             a, b = gather[row], gather[column]
             # one variable in the place of two local ones has both of their mixed derivatives
             twice = np.where((a == b) & (row != column)[:, None], 2.0, 1.0)

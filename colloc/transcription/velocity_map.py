@@ -15,6 +15,7 @@ import numpy as np
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.numerics.repeated import LocalFunction
+from colloc.numerics.sqp import keep_last
 
 _TOLERANCE, ACCEPTED = 1e-12, 1e3
 """Tolerance, and the factor on it where rounding stops the solver."""
@@ -40,10 +41,11 @@ class BalancedVelocity(ca.Callback):
 
     def __init__(self, body: Body, friction: Law, n_time: int) -> None:
         ca.Callback.__init__(self)
-        self._body, self._friction, self._n_time = body, friction, n_time
-        self._last: tuple[np.ndarray, np.ndarray, float] | None = None
-        self._z: np.ndarray | None = None
-        self.solves = 0
+        self._body, self._friction = body, friction
+        sizes = (body.n_joint, n_time), (body.n_joint, n_time), (3, n_time), (1, 1)
+        self._inputs = [ca.Sparsity.dense(*size) for size in sizes]
+        self._z, self._start, self.solves = np.full((3, n_time), np.nan), np.empty(0), 0
+        self._balanced = keep_last(self._solve)
         self.construct("velocity_map", {"enable_fd": False})
 
     def of_local(self, local: ca.MX, delta: ca.MX, *, relative: bool) -> ca.MX:
@@ -56,40 +58,27 @@ class BalancedVelocity(ca.Callback):
         return ca.repmat(speed, 3, 1) * self(q, unit, start, delta)
 
     def get_n_in(self) -> int:
-        return 4
+        return len(self._inputs)
 
     def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(
-            *(
-                (self._body.n_joint, self._n_time),
-                (self._body.n_joint, self._n_time),
-                (3, self._n_time),
-                (1, 1),
-            )[index]
-        )
+        return self._inputs[index]
 
     def get_sparsity_out(self, index: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(3, self._n_time)
+        return self._inputs[2]
 
     def eval(self, arguments: list[ca.DM]) -> list[ca.DM]:
-        angles, rates, start, delta = *(a.full() for a in arguments[:3]), float(arguments[3])
-        if self._last is not None and self._z is not None:
-            same = (
-                self._last[2] == delta
-                and np.array_equal(self._last[0], angles)
-                and np.array_equal(self._last[1], rates)
-            )
-            if same:
-                return [ca.DM(self._z)]
-        if not (np.isfinite(angles).all() and np.isfinite(rates).all()):
-            return [ca.DM(np.full((3, self._n_time), np.nan))]
-        if np.isnan(start).any() and self._z is not None:
-            start = self._z
+        angles, rates, self._start = (a.full() for a in arguments[:3])
+        at = np.concatenate([angles.ravel(), rates.ravel(), [float(arguments[3])]])
+        return [
+            ca.DM(self._balanced(at) if np.isfinite(at).all() else np.full_like(self._z, np.nan))
+        ]
+
+    def _solve(self, at: np.ndarray) -> np.ndarray:
+        angles, rates = at[:-1].reshape(2, self._body.n_joint, -1)
+        start = self._z if np.isnan(self._start).any() else self._start
         solved = self._body.solve(
-            self._friction, angles, rates, delta, start=np.nan_to_num(start), tolerance=_TOLERANCE
+            self._friction, angles, rates, at[-1], start=np.nan_to_num(start), tolerance=_TOLERANCE
         )
         self.solves += 1
-        z = np.where(solved.residual < ACCEPTED * _TOLERANCE, solved.z, np.nan)
-        self._last = (angles, rates, delta)
-        self._z = z
-        return [ca.DM(z)]
+        self._z = np.where(solved.residual < ACCEPTED * _TOLERANCE, solved.z, np.nan)
+        return self._z

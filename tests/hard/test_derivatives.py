@@ -46,13 +46,13 @@ def derivative(function, x, step):
 def check(function, x, given, delta, step, solved=None, tolerance=1e-6):
     """Jacobian and Hessian of a `LocalFunction` at x and given numbers; `solved` gives what it is
     solved for."""
-    more = [] if solved is None else [function.solved]
-    symbols = [function.local, function.given, function.delta, *more]
-    weight, slope, upper = function.derivatives
-    value, jacobian = (
-        ca.Function("f", symbols, [ca.densify(out)]) for out in (function.out, slope)
-    )
-    hessian = ca.Function("h", [*symbols, weight], [ca.densify(ca.triu2symm(upper))])
+    value, slope, curvature, on_slope, on_curvature = function.functions
+
+    def jacobian(*at):
+        return ca.DM(on_slope, slope(*at).full().ravel().tolist()).full()
+
+    def hessian(*at):
+        return ca.triu2symm(ca.DM(on_curvature, curvature(*at).full().ravel().tolist())).full()
 
     def at(x):
         return [x, given, delta, *([] if solved is None else [solved(x)])]
