@@ -345,27 +345,18 @@ def _following(
 def _derivatives(body: Any, friction: Law, anchor: int | None, *, pulled: bool) -> Any:
     """Derivatives along (angles, rates, load) at the velocity of a chain's anchor, or of a tail, by
     the implicit function theorem."""
-    import casadi as ca
+    from colloc.numerics.repeated import implicit_derivatives  # loads CasADi
 
     n = body.n_joint
-    y, z, delta = ca.SX.sym("y", 2 * n + 2 * pulled), ca.SX.sym("z", 3), ca.SX.sym("delta")
-    angles, rates, load = y[:n], y[n : 2 * n], y[2 * n :]
-    if anchor is TAIL:
-        slides: Any = body.sliding(friction, angles, rates, z, delta)
-        balance, tail = slides.force, z
-    else:
+
+    def equations(y: Any, z: Any, delta: Any) -> tuple[Any, Any]:
+        angles, rates, load = y[:n], y[n : 2 * n], y[2 * n :]
+        if anchor is TAIL:
+            slides = body.sliding(friction, angles, rates, z, delta)
+            return [z, slides.centre, slides.power], slides.force
         slides = body.sliding(friction, angles, rates, z, delta, anchor)
         posture = body.posture(angles, anchor)
         balance = slides.force + (load_wrench(body, posture, load) if pulled else 0.0)
-        tail = body.tail_velocity(posture, rates, z, anchor)
-    # R(z, y) = 0: dz/dy = -R_z^-1 R_y
-    out = ca.vertcat(tail, slides.centre, slides.power)
-    adjoint = ca.solve(ca.jacobian(balance, z).T, ca.jacobian(out, z).T)
-    slope = ca.jacobian(out, y).T - ca.jacobian(balance, y).T @ adjoint
-    # sharing subexpressions makes it no faster, and takes seconds for a body of many panels
-    function: Any = ca.Function("derivatives", [y, z, delta], [ca.vec(ca.densify(slope))])
+        return [body.tail_velocity(posture, rates, z, anchor), slides.centre, slides.power], balance
 
-    def evaluate(y: np.ndarray, z: np.ndarray, delta: float) -> np.ndarray:
-        return np.asarray(function(y, z, delta).full()).reshape(-1, *y.shape)
-
-    return evaluate
+    return implicit_derivatives(equations, 2 * n + 2 * pulled, 3)
