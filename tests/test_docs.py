@@ -265,7 +265,7 @@ def test_the_python_of_a_page_runs_from_top_to_bottom_and_prints_what_the_page_s
     names = {"__name__": "__main__"}
     pairs = r"^```python[^\n]*\n(.*?)^```(?:\s+```text\n(.*?)^```)?"
     for program, quoted in re.findall(pairs, read(page), MULTI):
-        optional = r"^(?:import|from) (pandas|xarray|dask_jobqueue)"
+        optional = r"^(?:import|from) (pandas|xarray|distributed)"
         for module in re.findall(optional, program, re.MULTILINE):
             pytest.importorskip(module)
         exec(compile(program, page.name, "exec"), names)

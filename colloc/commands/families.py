@@ -10,7 +10,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import BrokenExecutor, Executor
+from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -204,9 +204,6 @@ code, and is executed. Exit code 3: some cells have no certified gait.""",
         str, "study", None, "a Python file that states STUDY, for example studies/friction_plane.py"
     ),
     cli.WORKERS,
-    cli.option(
-        str, "--dask", "ADDRESS", "scheduler of a Dask cluster (tcp://host:8786), or 'local'"
-    ),
     cli.option(int, "--chunk", "N", "cells to a task, instead of the study's own number", least=1),
     cli.RETRY,
     cli.output("folder, or .nc file; NAME.study/ lies beside it (default: results/NAME.nc)"),
@@ -221,7 +218,6 @@ def sweep(options: argparse.Namespace) -> int:
     # slow imports only now: a bad study is refused at once
     from colloc.bounds.optimality_gap import upper_bound
     from colloc.studies.sweep import StudyRun, save_study, study_table
-    from colloc.system.task_pool import process_pool
 
     def known_bound(problem: Problem) -> float | None:
         known = upper_bound(problem, path.parent, compute=False)
@@ -237,15 +233,9 @@ def sweep(options: argparse.Namespace) -> int:
         run, total = StudyRun(study, folder, retry=options.retry), math.prod(study.shape)
         if not cli.quiet(options):
             print(f"{study.name}: {total} cells, {run.visited} of them in the journal", flush=True)
-        executor: Callable[[int], Executor] = process_pool
-        workers = options.workers
-        if options.dask is not None:
-            from colloc.system.dask_pool import connect
-
-            executor, workers = connect(options.dask, workers, cli.complain)
         due = time.perf_counter() + _SAVE_EVERY
         try:
-            for news in run.run(workers=workers, executor=executor):
+            for news in run.run(workers=options.workers):
                 if not cli.quiet(options):
                     print(news, flush=True)
                 if (begin := time.perf_counter()) > due:

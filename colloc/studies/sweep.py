@@ -352,6 +352,7 @@ def sweep(
     folder: str | os.PathLike[str] | None = None,
     *,
     workers: int = 1,
+    executor: Callable[[int], Executor] = pool_for,
     verbose: bool = False,
     progress: Callable[[Progress], object] | None = None,
 ) -> StudyTable:
@@ -365,6 +366,9 @@ def sweep(
         Folder of the journal, in which results are kept and not solved again.
     workers : int
         Processes, as for `multistart`.
+    executor : callable, optional
+        From a number of workers to a `concurrent.futures.Executor` to use in place of processes, as
+        of a cluster (docs/howto/cluster.md).
     verbose : bool
         Print every cell that is solved.
     progress : callable, optional
@@ -394,6 +398,6 @@ def sweep(
     study = study if isinstance(study, Study) else read_study_file(study)[0]
     with tempfile.TemporaryDirectory() as scratch:
         run = StudyRun(study, Path(folder or scratch))
-        for news in run.run(workers=workers, executor=pool_for):
+        for news in run.run(workers=workers, executor=executor):
             report(news)
         return study_table(run)

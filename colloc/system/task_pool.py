@@ -26,7 +26,6 @@ from multiprocessing.connection import wait as wait_for_handles
 from signal import SIG_IGN, SIGINT, signal
 from typing import Any
 
-from colloc.system.errors import CollocError
 from colloc.system.interruption import interruptible
 
 _MOMENT = 0.1  # longest time for which Ctrl-C is held back [s]
@@ -48,10 +47,6 @@ class Lost:
     """Stands for a result that the executor failed twice to give."""
 
     message: str
-
-
-class EngineGone(CollocError, RuntimeError):
-    """The executor as a whole is gone; no task is to blame."""
 
 
 @contextlib.contextmanager
@@ -142,8 +137,7 @@ def run_tasks(
 
     `ready` returns the next task, or None if there is none now; it is called again after each
     result, and the run ends when nothing is under way. `ahead` tasks wait for a worker. A task that
-    raises, or loses its worker, is repeated alone; if that fails too its result is `Lost`. While
-    nothing ends, a method `check` of the executor is called, which may raise `EngineGone`.
+    raises, or loses its worker, is repeated alone; if that fails too its result is `Lost`.
     BrokenExecutor is raised if not even a first task can be submitted.
     """
     suspects: list[Task] = []  # under way when a worker died
@@ -153,7 +147,6 @@ def run_tasks(
             alone = bool(suspects)
             most = 1 if alone else workers + ahead
             pool = executor(1 if alone else workers)
-            check = getattr(pool, "check", lambda: None)
             pending: dict[Future, Task] = {}
             any_submitted, listened = False, True
             try:
@@ -176,14 +169,10 @@ def run_tasks(
                         break
                     with interruptible():
                         done = wait(pending, timeout=_MOMENT, return_when=FIRST_COMPLETED).done
-                    if not done:
-                        check()
                     for future in done:
                         error = CancelledError() if future.cancelled() else future.exception()
-                        if isinstance(error, (BrokenExecutor, EngineGone)):
+                        if isinstance(error, BrokenExecutor):
                             raise error
-                        if error is not None:
-                            check()
                         task = pending.pop(future)
                         if error is None:
                             yield task, future.result()
@@ -200,10 +189,8 @@ def run_tasks(
                     suspects += pending.values()
                 for task in pending.values() if alone else ():
                     yield task, Lost("its worker process died twice (killed, or out of memory).")
-            except BaseException as error:
+            except BaseException:
                 listened = False
-                if isinstance(error, EngineGone):
-                    pending.clear()  # nobody answers
                 raise
             finally:
                 # interrupted, or nobody listens any more: do not wait for what is under way

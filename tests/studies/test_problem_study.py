@@ -518,9 +518,6 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
     again = load_study(out / "tiny.nc").variables["efficiency"]
     np.testing.assert_array_equal(again, table["efficiency"])
-    pytest.importorskip("distributed")
-    assert sweep_study([*words, "--dask", "nonsense://x"]) == 2
-    assert "no Dask scheduler at nonsense://x" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")

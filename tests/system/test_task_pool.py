@@ -14,11 +14,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from colloc.system.dask_pool import connect
-from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost, Task, process_pool, run_tasks
-
-ENDED = threading.Event()
 
 
 def listed(tasks):
@@ -155,24 +151,6 @@ def test_workers_do_not_outlive_a_parent_that_is_killed():
             break
         time.sleep(0.05)
     assert gone
-
-
-@pytest.fixture
-def cluster():
-    """A Dask cluster in this process, without workers; its port is one that is free."""
-    distributed = pytest.importorskip("distributed")
-    ENDED.clear()
-    how = {"n_workers": 0, "threads_per_worker": 1, "dashboard_address": ":0"}
-    with distributed.LocalCluster(processes=False, **how) as cluster:
-        yield cluster
-        ENDED.set()  # the thread of a worker is waited for
-
-
-def test_a_dask_scheduler_without_workers_is_waited_for_a_stated_time_only(cluster):
-    said = []
-    with pytest.raises(ProblemError, match="had no workers for 1 s; start some, for example: dask"):
-        connect(cluster.scheduler_address, 1, said.append, patience=1.0)
-    assert "waiting for one, 1 s at most" in said[0]
 
 
 def test_ctrl_c_while_a_task_is_handed_over_leaves_the_executors_locks_open():
