@@ -14,6 +14,7 @@ import numpy as np
 from benchmarks.tables import interleaved_seconds, markdown_table
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from scripts.program import command_line
 
 BODY, MANY = Chain(), 10_000
 LAWS = (Friction(), Friction(mu_t=2.5, mu_f=1, mu_b=1.6))
@@ -27,6 +28,7 @@ def random_instants(count: int, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
 
 
 def main() -> None:
+    command_line(__doc__)
     if native_kernel() is None:
         raise SystemExit("no C compiler on this machine, so there is nothing to compare.")
     rows = []

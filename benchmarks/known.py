@@ -1,7 +1,7 @@
 """The best gaits that are known, as a table that a referee checks from the gaits alone, and that
 anyone can beat (``python -m benchmarks.referee``).
 
-A row states a problem, a member of its class of gaits by the class's own parameters, and what the
+A row states a problem, a member of its class of gaits by its decision variables, and what the
 gait achieves. Nothing that a solver said is in it: `Known.certificate` replays the gait, and that
 is what counts.
 """
@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
@@ -71,8 +72,7 @@ class Known:
 
     @property
     def gait(self) -> AnyGait:
-        problem = self.problem
-        return problem.gait.member(np.array(self.parameters), problem.body.n_joint)
+        return control_problem(self.problem).admissible.member(np.array(self.parameters))
 
     @property
     def question(self) -> str:
@@ -156,7 +156,7 @@ def row_of(solution: Solution, command: str) -> Known:
         )
     return Known(
         problem.with_(guess=None).to_dict(),
-        tuple(answer.x[answer.layout.parameters[:, 0]].tolist()),
+        tuple(answer.x[answer.layout.decisions].tolist()),
         **{name: float(getattr(solution.certificate, name)) for name in _NUMBERS},
         dry=solution.certificate.dry,
         command=command,

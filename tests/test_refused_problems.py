@@ -121,5 +121,5 @@ def test_names_of_files_that_colloc_makes_beside_results_are_refused(name, taken
     if taken:
         assert colloc.Problem(name).name == name
     else:
-        with pytest.raises(ProblemError, match=r"name must (not end|begin)"):
+        with pytest.raises(ProblemError, match=r"name must (not end|be at most 200 letters)"):
             colloc.Problem(name)

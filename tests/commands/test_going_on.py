@@ -1,6 +1,8 @@
 """Commands that solve several problems one after another: what an interrupted one has solved, the
 same command does not solve again."""
 
+from functools import wraps
+
 import pytest
 
 from colloc.commands.main import main
@@ -21,15 +23,16 @@ def test_an_interrupted_command_goes_on_from_its_last_problem(name, tmp_path, mo
     command = [name, "p.py", *COMMANDS[name], "--starts", "1", "--no-figure", "--quiet"]
     kept, computed, interruptions = Run.result, [], []
 
-    def interrupted_at_the_second(run, stage, given, compute):
-        def counted():
+    def interrupted_at_the_second(run, stage, arguments):
+        @wraps(stage)
+        def counted(*arguments):
             computed.append(run.problem.hash)
             if computed[0] != computed[-1] and not interruptions:
                 interruptions.append("once")
                 raise KeyboardInterrupt
-            return compute()
+            return stage(*arguments)
 
-        return kept(run, stage, given, counted)
+        return kept(run, counted, arguments)
 
     monkeypatch.setattr(Run, "result", interrupted_at_the_second)
     assert main(command) == 130
