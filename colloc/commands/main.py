@@ -29,7 +29,7 @@ SUBCOMMANDS = {
     "init": ("solve", "write a commented problem file for a chain of links, to change and solve"),
     "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
     "multistart": ("families", "solve from many random starts; distinct optima, how often found"),
-    "sweep": ("families", "solve a study, a grid of problems, over processes or a cluster"),
+    "sweep": ("families", "solve a study, a grid of problems, over processes"),
     "pareto": ("families", "trade-off (Pareto front) of two objectives, as certified gaits"),
     "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),
     "evaluate": ("solve", "evaluate a gait of your own: joint angles from a CSV file"),

@@ -361,7 +361,7 @@ def run_guess(
             raise KeyboardInterrupt
         else:
             where = "no optimum yet"
-            if news[-1].best:
+            if news and news[-1].best:
                 where = f"the last optimum was at delta = {solution.answer.delta:.1e}"
             message = f"gave up after {time_limit:g} s; {where}."
             outcome = Outcome(start, TIME_LIMIT, message, guess, guess)

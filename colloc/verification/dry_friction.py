@@ -144,7 +144,7 @@ def dry_balance(body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarra
             masks = better, better, better, better.reshape(-1, 1, 1)
             rows = zip(masks, trial, best, strict=True)
             best = _Tangent(*(np.where(mask, new, old) for mask, new, old in rows))
-            missed, damping = np.minimum(off, missed), np.where(better, 1.0, 0.25 * damping)
+            missed, damping = np.where(better, off, missed), np.where(better, 1.0, 0.25 * damping)
         return best, missed
 
     twice = body.solve(law, angles, rates, 2 * _SMOOTHED).z

@@ -265,6 +265,15 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
     assert "the last optimum was at delta = 1.0e-01" in slow.message
 
 
+def test_a_start_without_time_for_its_first_step_ends_at_the_time_limit(monkeypatch):
+    def silent(stated, starts, *, seconds, progress, accept):
+        return replace(solve(stated, starts), interrupted=True, certificate=UNCERTIFIED)
+
+    monkeypatch.setattr(campaign, "search_solve", silent)
+    slow = campaign.run_guess(problem(), lambda: GAIT, 0, 1e-9)
+    assert (slow.status, slow.message) == (TIME_LIMIT, "gave up after 1e-09 s; no optimum yet.")
+
+
 class _Dying(Executor):
     """Breaks, like a pool whose worker was killed, whenever start 2 is submitted."""
 

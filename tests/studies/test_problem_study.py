@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from shared.store_samples import load_study
 
+import colloc
 from colloc import BSpline, Chain, Corners, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.commands.families import sweep as sweep_study
 from colloc.commands.families import sweep_summary
@@ -106,6 +107,24 @@ def study_file(folder, text=FILE):
     path = folder / "tiny.py"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def test_a_sweep_runs_on_the_executor_that_is_passed_and_goes_on_from_its_folder(fake, tmp_path):
+    asked, seen = [], []
+
+    def cluster(workers):
+        asked.append(workers)
+        return ThreadPoolExecutor(workers)
+
+    how = {"workers": 2, "executor": cluster, "progress": seen.append}
+    first = colloc.sweep(grid(), tmp_path, **how)
+    visits = len(seen)
+    assert visits >= 12
+    assert set(asked) == {2}
+    again = colloc.sweep(grid(), tmp_path, **how)
+    assert len(seen) == visits
+    assert np.array_equal(again.variables["value"], first.variables["value"], equal_nan=True)
+    assert np.array_equal(first.variables["value"], colloc.sweep(grid()).variables["value"], True)
 
 
 def test_a_grid_of_a_million_cells_makes_its_problems_as_it_reaches_them(fake, tmp_path):
