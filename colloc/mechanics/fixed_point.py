@@ -320,6 +320,7 @@ def _following(
     """The motion of a chain, and its derivatives if asked for."""
     body, friction, angles, rates, delta, load = moving
     n_time, columns = angles.shape[1], 2 * len(angles) + 2 * (load is not None)
+    load = None if load is None else np.asarray(load, dtype=float)
     values = np.empty((7, n_time))
     slopes = np.empty((6, columns, n_time) if differentiated else 0)
     if (library := native_kernel(body, friction)) is not None:

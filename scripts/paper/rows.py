@@ -51,6 +51,11 @@ def statement(what: str, printed: str, computed: str, holds: bool, error: str = 
     return Row(what, printed, computed, error, "consistent" if holds else "does not hold")
 
 
+def connection(made: Arrays) -> Iterator[Row]:
+    more = int(made["anisotropic_faces"]) - 2
+    yield statement("maps needed if mu_b != mu_f", "two more", f"{more} more", more == 2)
+
+
 def sweep(s: Arrays) -> Iterator[Row]:
     yield Row(
         f"sweep over {int(s['inside'].sum())} gaits at 100 instants: largest efficiency error",
@@ -288,6 +293,7 @@ def crawlers(made: Arrays) -> Iterator[Row]:
 
 
 _ROWS: dict[Callable[..., Iterator[Row]], tuple[str, ...]] = {
+    connection: ("connection",),
     sweep: ("sweep",),
     plane: ("plane",),
     optima: ("optima", "delta", "sweep"),

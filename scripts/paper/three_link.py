@@ -11,6 +11,7 @@ from scipy.integrate import cumulative_simpson
 from colloc.gaits.harmonic import ellipse
 from colloc.mechanics.balance import instant
 from colloc.mechanics.fixed_point import solve_balance
+from colloc.mechanics.friction import Friction
 from colloc.verification.replay import replay
 from scripts.models.ellipses import (
     BODY,
@@ -33,6 +34,16 @@ def face(ratio: float, leading: int, nodes: np.ndarray, delta: float) -> np.ndar
     return z.reshape(3, nodes.size, nodes.size)
 
 
+def faces_needed(friction: Friction, delta: float) -> int:
+    """Faces of the square of rates that a map needs: two, or four where reversed rates do not
+    reverse the velocity."""
+    angles, rates = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 2, 20))
+    ahead, back = (
+        solve_balance(BODY, friction, angles, side * rates, delta).require().z for side in (1, -1)
+    )
+    return 2 if np.allclose(back, -ahead, rtol=0, atol=1e-8) else 4
+
+
 def connection(context: Context) -> Arrays:
     """The paper's "connection": velocities over shapes and ratios of rates, on two faces of the
     square of rates. They are homogeneous of degree 1 in the rates, and change signs with them."""
@@ -43,7 +54,8 @@ def connection(context: Context) -> Arrays:
         solve = partial(face, leading=leading, nodes=nodes, delta=settings["delta"])
         rows = parallel_map(solve, list(ratios), processes=context.processes, label="velocity map")
         faces.append(np.stack(rows, axis=-1))
-    return {"angles": nodes, "ratios": ratios, "z": np.stack(faces)}
+    needed = faces_needed(Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), settings["delta"])
+    return {"angles": nodes, "ratios": ratios, "z": np.stack(faces), "anisotropic_faces": needed}
 
 
 def _grid_arrays(grid: GaitGrid) -> Arrays:

@@ -86,3 +86,12 @@ def test_a_body_with_shape_coordinates_of_its_own_is_not_taken_for_its_joints():
 
     with pytest.raises(ProblemError, match="not its 2 joints"):
         solve_balance(Belt(), Friction(), *random_instants(5, n_joint=1), 1e-3)
+
+
+def test_a_load_in_whole_numbers_counts_as_they_do():
+    angles, rates = np.array([[0.5], [0.2]]), np.array([[1.0], [0.0]])
+    at = Chain(), Friction(), angles, rates, 1e-3
+    load = np.array([[0], [1]])
+    solved = solve_balance(*at, load=0.3 * load)
+    whole, real = (at[0].motion(*at[1:], solved, load=each) for each in (load, 1.0 * load))
+    assert whole.actuator_power == real.actuator_power

@@ -5,7 +5,7 @@ import pytest
 
 from colloc import Chain, Friction, solve_balance
 from scripts.paper.study import Context
-from scripts.paper.three_link import connection
+from scripts.paper.three_link import connection, faces_needed
 
 DELTA = 1e-3
 
@@ -20,6 +20,14 @@ def test_its_nodes_are_balanced_velocities_at_unit_larger_rate_and_those_of_reve
     for scale in (1.0, -7.3):
         direct = solve_balance(Chain(), Friction(), angles, scale * rates, abs(scale) * DELTA).z
         np.testing.assert_allclose(scale * stored, direct, atol=1e-9)
+
+
+def test_two_more_faces_are_needed_where_friction_backwards_is_another():
+    assert (
+        connection(Context({"delta": DELTA, "angles": 2, "ratios": 2}, {}, 1))["anisotropic_faces"]
+        == 4
+    )
+    assert faces_needed(Friction(mu_t=1.7), DELTA) == 2
 
 
 def test_kink_where_a_joint_rests():
