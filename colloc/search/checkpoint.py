@@ -291,11 +291,12 @@ def active_run() -> Run:
 
 
 def checkpointed(stage: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """A function of values, called without names of its arguments, whose results are stored in the
-    run under way."""
+    """A function of values, called by place, whose results are stored in the run under way."""
 
     @functools.wraps(stage)
-    def stored(*arguments: Arguments.args, **_: Arguments.kwargs) -> Result:
+    def stored(*arguments: Arguments.args, **named: Arguments.kwargs) -> Result:
+        if named:
+            raise TypeError(f"{stage.__name__} takes its arguments by place.")
         return active_run().result(stage, arguments)
 
     return stored

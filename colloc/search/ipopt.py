@@ -77,7 +77,7 @@ class Solver:
         chosen = {**IPOPT_OPTIONS, **lifted, **(options or {})}
         self._settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         off = ("print_time", "calc_lam_p", "calc_lam_x", "calc_f", "calc_g", "error_on_fail")
-        self._settings |= dict.fromkeys(off, False) | {"no_nlp_grad": True, "record_time": True}
+        self._settings |= dict.fromkeys(off, False) | {"no_nlp_grad": True}
         # held here: CasADi does not keep it alive
         self._stop = StopRequest(self._nlp.expressions)
         self._settings |= {**self._nlp.functions, "iteration_callback": self._stop}
@@ -101,11 +101,11 @@ class Solver:
         multipliers: tuple[np.ndarray, np.ndarray] | None,
         radius: float,
     ) -> NlpResult:
-        """Maximise from x ``(n,)`` within a trust region of so many radians for each gait
-        parameter, at delta per period; `multipliers` (lam_x, lam_g) are those closest to
-        stationarity by default."""
+        """Maximise from x ``(n,)`` at delta per period, the gait's parameters, heading and log
+        period within a trust region of such a radius; `multipliers` (lam_x, lam_g) are those
+        closest to stationarity by default."""
         t = self.program
-        own, lower, upper = t.layout.parameters[:, 0], t.lower.copy(), t.upper.copy()
+        own, lower, upper = t.layout.decisions, t.lower.copy(), t.upper.copy()
         lower[own] = np.maximum(lower[own], x[own] - radius)
         upper[own] = np.minimum(upper[own], x[own] + radius)
         lam_x, lam_g = multipliers or self._complete(
@@ -198,7 +198,7 @@ def solve_in_regions(
     worst instants there; and the program of the last region. There are at most twenty: gaits of
     three joints go 2 rad and more."""
     result: NlpResult | None = None
-    p = program.layout.parameters[:, 0]
+    p = program.layout.decisions
     for _ in range(20):
         last = Solver(program, options).solve_within(x, delta, None, radius)
         result = last if result is None else last.accumulate(result)
@@ -240,7 +240,6 @@ _MEANING = {
     "torque": "the balance of torques",
     "balance": "the balance of the body",
     "force law": "the law of friction",
-    "rotation": "closure of the net rotation",
     "orientation": "the rotation between nodes",
     "distance": "the distance gained over an interval",
     "work": "the work gained over an interval",
@@ -282,8 +281,6 @@ def row_meaning(program: FullProgram, row: int) -> tuple[str, float]:
     if name in ("angles", "rates"):
         joint = f"{body.defaults.coordinate} {index // mesh.n_point + 1}"
         what = f"the {name[:-1]} of {joint} against its gait"
-    elif name == "rotation":
-        return what, float(mesh.edges[-1])
     elif name in integrals or name in ("at least", "shape speed", "heading", "across"):
         return what, 0.0
     if count % mesh.n_point == 0:  # rows of points, part by part

@@ -142,17 +142,17 @@ def finish(problem: Problem, optimum: Iterate) -> Solution:
 
 def confirm_optimum(optimum: Iterate) -> Answer:
     """An optimum through refine and confirm; where it turns out to be a saddle, the one below."""
-    below: Iterate | None = descend(optimum)
-    for _ in range(1 + OPTIONS.attempts):
-        if below is None:
-            break
+    below = descend(optimum)
+    for left in range(OPTIONS.attempts, -1, -1):
         optimum = refine(below)
         active_run().report("confirm", 0, 1, optimum)
         answer = confirm(optimum)
         second = answer.second_order
-        if not second.smallest + second.error < -TOLERANCES.saddle:
+        if not left or not second.smallest + second.error < -TOLERANCES.saddle:
             break
-        below = leave_saddle(optimum)
+        if (lower := leave_saddle(optimum)) is None:
+            break
+        below = lower
     return answer
 
 

@@ -24,7 +24,7 @@ from colloc.search.certify import certify
 from colloc.search.checkpoint import ROWS, STAGES, Run
 from colloc.search.confirm import confirm
 from colloc.search.explore import explore, first_optimum
-from colloc.search.optimise import descend, refine
+from colloc.search.optimise import descend, project_to_zero_rotation, refine
 from colloc.search.options import SearchOptions
 from colloc.search.solve import certify_answer, choose, solve
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
@@ -400,3 +400,9 @@ def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess(
         first.gait.angles(np.arange(9) / 9), QUICK.guess.angles(np.arange(9) / 9), atol=1e-12
     )
     assert best.value == seen[-1].value > 1.5 * first.value
+
+
+def test_a_stage_refuses_arguments_by_name_which_its_digest_would_miss():
+    gait = QUICK.guess
+    with pytest.raises(TypeError, match="by place"):
+        project_to_zero_rotation(QUICK, gait, delta=0.1)

@@ -4,15 +4,17 @@ the one found is better."""
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Friction, Harmonic, Polygon, Problem, ellipse, load, save
+from colloc import Chain, Fourier, Free, Friction, Harmonic, Polygon, Problem, ellipse, load, save
 from colloc.commands.results import verify
 from colloc.commands.solve import summary_lines
 from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics.bodies import FULL
 from colloc.reduced.program import ReducedProgram
 from colloc.search.certify import gait_certificate
+from colloc.search.ipopt import Solver
 from colloc.search.iterate import space_near
 from colloc.search.solve import solve
+from colloc.transcription.full_program import FullProgram
 from colloc.verification.differential_motion import slope_motion
 from colloc.verification.mesh_error import mesh_error
 
@@ -31,6 +33,31 @@ def uphill(once):
 def run(body, gait, grade=0.1, **settings):
     ran = slope_motion(body, Friction(), gait, 1e-2, grade, tolerance=1e-4, **settings)
     return ran.climb[0] / ran.joint_work[0]
+
+
+@pytest.mark.parametrize(
+    "free",
+    [
+        {"grade": 0.1},
+        {"froude": Free(0.01, 1), "objective": "distance / (work + 0.1 * period)"},
+    ],
+)
+def test_the_trust_region_of_ipopt_holds_heading_and_pace(free):
+    gait = Harmonic(1) if "froude" in free else Harmonic(1, "bilateral")
+    stated = Problem("free", ellipse(0, 2.8, 1.3), gait=gait, delta=1e-2, intervals=12, **free)
+    space, v = space_near(stated, stated.guess)
+    parameters = space.full_parameters(v)
+    program = FullProgram(space.control, parameters, space.mesh.edges, space.mesh.scheme.name)
+    x, static = program.feasible(parameters, 0.1), program.layout.static[:, 0]
+    result = Solver(program, {"max_iter": 10}).solve_within(x, 0.1, None, 1e-3)
+    assert 0 < np.abs(result.x[static] - x[static]).max() <= 1.01e-3
+
+
+def test_ipopt_alone_finds_the_same_heading(uphill):
+    alone = solve(PROBLEM, search="full")
+    assert alone.success, alone.message
+    assert alone.value == pytest.approx(uphill.value, rel=1e-4)
+    assert alone.gait.theta == pytest.approx(uphill.gait.theta, abs=1e-2)
 
 
 def test_the_answer_is_a_certified_solution_of_the_full_program(uphill):
