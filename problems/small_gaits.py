@@ -4,7 +4,7 @@ space.
 At a shape q a small gait spends times w_i in directions r_i of the joint rates, with sum w_i r_i =
 0 (the path closes) and sum w_i omega_i = 0 (so does the rotation). Dry friction is homogeneous of
 degree 1 but not linear, so such a gait moves in first order of its size: d/W = sum w_i e.v_i / sum
-w_i P_i, a linear program (`bounds.infinitesimal`, docs/bound.md section 4).
+w_i P_i, a linear program (`bounds.motions`, docs/bound.md section 4).
 
 `PROBLEM` gives a search with three harmonics the best of them as its guess: the triangle about (c,
 -c), whose efficiency tends to 2/5 as it shrinks. The best of its starts is another gait, a large

@@ -172,6 +172,8 @@ def multistart(options: argparse.Namespace) -> int:
 def _open_archive(options: argparse.Namespace) -> int:
     from colloc.results.archive import StartName, archive_at
 
+    if changes := cli.problem_changes(options):
+        raise ProblemError(f"an archive states its problem: leave {', '.join(changes)} out.")
     archive = archive_at(options.problem)
     problem, start = archive.problem, StartName(options.sampler, options.seed, options.start)
     if options.start is None:

@@ -207,6 +207,11 @@ MAX_SPEED = option(float, "--max-speed", "V", "of the joints [rad/s], one or one
 MAX_TORQUE = option(float, "--max-torque", "M", "of the joints [N m], one or one each", nargs="+")
 
 
+def problem_changes(options: argparse.Namespace) -> dict[str, Any]:
+    names = (more.get("dest", name[2:].replace("-", "_")) for name, more in _CHANGES)
+    return {name: x for name in names if (x := getattr(options, name)) is not None}
+
+
 def read_problem(
     options: argparse.Namespace, start: str | None = None
 ) -> tuple[ProblemFile, Problem]:
@@ -215,8 +220,7 @@ def read_problem(
     from colloc.gaits.problem_file import read_problem_file
 
     stated = read_problem_file(options.problem)
-    names = (more.get("dest", name[2:].replace("-", "_")) for name, more in _CHANGES)
-    changes = {name: x for name in names if (x := getattr(options, name)) is not None}
+    changes = problem_changes(options)
     problem = stated.problem.with_(**changes) if changes else stated.problem
     if start is None:
         return stated, problem
