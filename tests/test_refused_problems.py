@@ -102,6 +102,7 @@ gait=Polygon(2), friction=Friction(mu_t=1, mu_f=1, mu_b=2)
 gait=Basis([BUMP]), friction=Friction(mu_t=1, mu_f=1, mu_b=2)
 froude=0.1, body=Chain((0.4, 0.6)), gait=Harmonic(3, "antipodal"), friction=Friction(mu_t=2.0)
 froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(2)
+delta_start=0.0
 """
 
 

@@ -235,23 +235,22 @@ class Problem:
         self._set(**{name: x for name, x in defaults.items() if getattr(self, name) is None})
 
     def _check_discretisation(self) -> None:
-        ranges = {
-            "delta": (SMALLEST_DELTA, LARGEST_DELTA),
-            "delta_start": (0.0, LARGEST_DELTA),
-            "smallest_shape_speed": (np.finfo(float).tiny, np.inf),
-        }
-        check_finite(mesh_tolerance=self.mesh_tolerance, **{x: getattr(self, x) for x in ranges})
-        for name, (least, most) in ranges.items():
-            value = getattr(self, name)
-            if value <= 0:
-                raise ProblemError(f"{name} must be positive, not {value:g}.")
-            if not least <= value <= most:
-                bound = f"at least {least:g}" if value < least else f"at most {most:g}"
-                raise ProblemError(
-                    f"{name} must be {bound}, not {value:g}: slower speeds are lost in rounding, "
-                    f"faster ones make friction viscous. The paper uses 1e-4, and a certificate "
-                    f"states the efficiency for delta -> 0."
-                )
+        numbers = ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance")
+        check_finite(**{name: getattr(self, name) for name in numbers})
+        for name in ("delta", "smallest_shape_speed"):
+            if getattr(self, name) <= 0:
+                raise ProblemError(f"{name} must be positive, not {getattr(self, name):g}.")
+        if self.delta < SMALLEST_DELTA:
+            raise ProblemError(
+                f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: slower speeds are "
+                f"lost in rounding. The paper uses 1e-4, and a certificate states the efficiency "
+                f"for delta -> 0."
+            )
+        if max(self.delta, self.delta_start) > LARGEST_DELTA:
+            raise ProblemError(
+                f"delta and delta_start must be at most {LARGEST_DELTA:g}: at such speeds friction "
+                f"would be viscous."
+            )
         if self.mesh_tolerance != 0 and not 1e-9 <= self.mesh_tolerance < 1:
             raise ProblemError(
                 f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}."

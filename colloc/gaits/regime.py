@@ -166,9 +166,9 @@ class Regime:
         if not self.slides and not self.froude:
             return
         gaits, name, where = problem.gait, type(problem.gait).__name__, "on a slope"
-        linear = hasattr(gaits, "functions") and problem.joint_map is None
+        free_joints = problem.joint_map is None
         if self.slides:
-            if not linear:
+            if not free_joints:
                 raise ProblemError(
                     f"on a slope gaits say where the body points, which those of the class {name} "
                     f"cannot: take Harmonic, BSpline, Basis or Polygon."
@@ -178,7 +178,7 @@ class Regime:
                     f"on a slope no part of a period follows from another: take {name}(..., "
                     f"symmetry='none'), which has gaits of symmetry {gaits.symmetry}, too."
                 )
-        if self.free and not (linear and gaits.linear and not gaits.relative_delta):
+        if self.free and not (free_joints and gaits.linear and not gaits.relative_delta):
             raise ProblemError(
                 f"a free pace is sought with a gait of a class Harmonic, not {name}."
             )
