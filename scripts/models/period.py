@@ -140,7 +140,9 @@ def snapshots(
     if motion.antipodal:
         theta = theta - 0.5 * theta[half]  # the path then advances along x
     rate = (z[0] + 1j * z[1]) * np.exp(1j * theta)
-    tail = cumulative_simpson(rate, x=t, initial=0.0)
+    # SciPy 1.13 knows no complex numbers here
+    x, y = cumulative_simpson([rate.real, rate.imag], x=t, initial=0.0)
+    tail = x + 1j * y
     keep = slice(None, None, _STEPS_BETWEEN)
     grid = PanelGrid(np.linspace(0.0, 1.0, panels + 1)[:, None] * np.ones((1, count + 1)))
     angle = motion.angle(grid.nodes, t[keep])

@@ -165,7 +165,10 @@ def motions(context: Context) -> Arrays:
         ends = np.hypot(velocity.vs, velocity.vn + 0.5 * BODY.length_column() * velocity.w)
         theta = cumulative_simpson(z[2], x=t, initial=0.0)
         rate = (z[0] + 1j * z[1]) * np.exp(1j * theta)
-        tail = cumulative_simpson(rate, x=t, initial=0.0)
+        x, y = cumulative_simpson(
+            [rate.real, rate.imag], x=t, initial=0.0
+        )  # SciPy 1.13: no complex
+        tail = x + 1j * y
         x, y = BODY.joints(angles)
         lab = (tail + (x + 1j * y) * np.exp(1j * theta)) * np.exp(-1j * np.angle(tail[-1]))
         speeds = np.concatenate([np.hypot(z[:1], z[1:2]), ends])
