@@ -343,11 +343,11 @@ def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_the
 
 @pytest.mark.parametrize("thread", ["main", "worker"])
 def test_time_that_is_over_gives_the_best_gait_so_far(thread):
-    """In a worker too, which no signal reaches: twenty links spend half a minute before SQP first
-    asks."""
+    """In a worker too, which no signal reaches: twenty links spend half a minute of the processor
+    before SQP first asks. A machine that is busy with other things makes no difference."""
     links = 20
     problem = Problem("long", body=Chain((1 / links,) * links), gait=Harmonic(1, "antipodal"))
-    begin, found = time.monotonic(), []
+    begin, found = time.process_time(), []
     if thread == "main":
         found.append(solve(problem, seconds=2.0))
     else:
@@ -355,8 +355,8 @@ def test_time_that_is_over_gives_the_best_gait_so_far(thread):
             target=lambda: found.append(solve(problem, seconds=2.0)), daemon=True
         )
         worker.start()
-        worker.join(10)
-    assert time.monotonic() - begin < 4.0
+        worker.join(60)
+    assert time.process_time() - begin < 6.0
     (solution,) = found
     assert solution.status == "interrupted"
     assert "2 s allowed are over" in solution.message
