@@ -183,5 +183,6 @@ def test_an_archive_is_gone_on_with_and_its_starts_are_opened(tmp_path, capsys):
     assert opened.efficiency == pytest.approx(first.outcomes[1].efficiency, rel=1e-4)
     assert main(["multistart", str(path), "--start", "7"]) == 2
     assert "holds no start 7" in capsys.readouterr().err
-    assert main(["multistart", str(path), "--start", "1", "--delta", "1e-3"]) == 2
-    assert "leave delta out" in capsys.readouterr().err
+    ignored = ["--mesh", "30", "--starts", "5", "--bound"]
+    assert main(["multistart", str(path), "--start", "1", *ignored]) == 2
+    assert "leave --mesh, --starts, --bound out" in capsys.readouterr().err

@@ -35,6 +35,10 @@ if TYPE_CHECKING:
     from colloc.studies.study import Study
     from colloc.studies.sweep import StudyTable
 
+_STARTS = cli.option(int, "--starts", "N", "starts 0 to N-1 (default: 20)", 20, least=1)
+_TIME_LIMIT = cli.option(
+    float, "--time-limit", "S", "seconds for one start (default: 300)", 300.0, least=0
+)
 _MOST_SHOWN = 12
 _SAVE_EVERY = 60.0  # seconds
 _AIMS = SPEED.name, EFFICIENCY.name
@@ -91,7 +95,7 @@ start like any other, solved again from its gait (from its guess, if it had fail
   colloc multistart problems/three_link.py --starts 100 --workers 2
   colloc multistart results/three_link.starts.h5 --start 7     results/three_link.start-7.h5""",
     *cli.PROBLEM,
-    cli.option(int, "--starts", "N", "starts 0 to N-1 (default: 20)", 20, least=1),
+    _STARTS,
     cli.option(int, "--seed", "N", "of the sampler (default: 0)", 0, least=0),
     cli.WORKERS,
     cli.option(
@@ -102,7 +106,7 @@ start like any other, solved again from its gait (from its guess, if it had fail
         LATIN_HYPERCUBE,
         choices=SAMPLERS,
     ),
-    cli.option(float, "--time-limit", "S", "seconds for one start (default: 300)", 300.0, least=0),
+    _TIME_LIMIT,
     cli.RETRY,
     cli.BOUND,
     cli.option(int, "--start", "N", "with an archive: the start to make a result of"),
@@ -172,8 +176,8 @@ def multistart(options: argparse.Namespace) -> int:
 def _open_archive(options: argparse.Namespace) -> int:
     from colloc.results.archive import StartName, archive_at
 
-    if changes := cli.problem_changes(options):
-        raise ProblemError(f"an archive states its problem: leave {', '.join(changes)} out.")
+    unused = *cli.CHANGES, _STARTS, cli.WORKERS, _TIME_LIMIT, cli.RETRY, cli.BOUND
+    cli.refuse(options, "an archive holds its problem and its starts", *unused)
     archive = archive_at(options.problem)
     problem, start = archive.problem, StartName(options.sampler, options.seed, options.start)
     if options.start is None:

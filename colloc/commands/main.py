@@ -179,7 +179,7 @@ BOUND = flag("--bound", "compute an upper bound on every gait (a minute; kept in
 WORKERS = option(int, "--workers", "N", "processes, one BLAS thread each (default: 1)", 1, least=1)
 RETRY = flag("--retry", "solve again what ended in an error, a crash or the time limit")
 RESULT = option(str, "result", "FILE.h5", "a result that colloc solve wrote")
-_CHANGES = (
+CHANGES = (
     option(float, "--delta", "SPEED", "final regularisation speed of friction"),
     option(float, "--delta-start", "SPEED", "first delta of the continuation"),
     option(int, "--mesh", "N", "intervals of the first mesh", dest="intervals"),
@@ -196,7 +196,7 @@ PROBLEM = (
         None,
         "a Python file that states PROBLEM, for example problems/three_link.py",
     ),
-    *_CHANGES,
+    *CHANGES,
 )
 """The problem file, and the changes to it that every solving command takes."""
 LENGTH = option(float, "--length", "M", "of the stretched robot [m]")
@@ -208,8 +208,21 @@ MAX_TORQUE = option(float, "--max-torque", "M", "of the joints [N m], one or one
 
 
 def problem_changes(options: argparse.Namespace) -> dict[str, Any]:
-    names = (more.get("dest", name[2:].replace("-", "_")) for name, more in _CHANGES)
-    return {name: x for name in names if (x := getattr(options, name)) is not None}
+    return {
+        name: x for name in map(_attribute, CHANGES) if (x := getattr(options, name)) is not None
+    }
+
+
+def _attribute(option: Option) -> str:
+    name, settings = option
+    return settings.get("dest", name[2:].replace("-", "_"))
+
+
+def refuse(options: argparse.Namespace, why: str, *unused: Option) -> None:
+    """Raise a `ProblemError` if options that would do nothing are not as by default."""
+    given = [x for x in unused if getattr(options, _attribute(x)) != x[1].get("default", False)]
+    if given:
+        raise ProblemError(f"{why}: leave {', '.join(name for name, _ in given)} out.")
 
 
 def read_problem(

@@ -28,6 +28,10 @@ _TOLERANCE = 1e-6
 _AGREEMENT, _SAME_SIZE = 3.0, 10.0
 _MOST_INSTANTS = 100_000
 _PACE = ("period", "max_speed", "max_torque")
+_REPLAY = cli.option(
+    float, "--tolerance", "TOL", "of the replayed efficiency, relative", _TOLERANCE
+)
+_DRY = cli.flag("--dry", "also bounds under dry friction, with no delta")
 _ERRORS = {
     **{name: f"{name}_error" for name in ("efficiency", "value", "distance", "work")},
     "efficiency_at_zero_delta": "error_at_zero_delta",
@@ -99,8 +103,8 @@ are compared with those of another result, at the start phase and the symmetry o
   colloc verify results/three_link.h5 --tolerance 1e-8
   colloc verify results/a.h5 --compare results/b.h5""",
     cli.RESULT,
-    cli.option(float, "--tolerance", "TOL", "of the replayed efficiency, relative", _TOLERANCE),
-    cli.flag("--dry", "also bounds under dry friction, with no delta"),
+    _REPLAY,
+    _DRY,
     cli.option(str, "--compare", "FILE.h5", "compare with this result, and replay neither"),
 )
 def verify(options: argparse.Namespace) -> int:
@@ -108,6 +112,7 @@ def verify(options: argparse.Namespace) -> int:
         raise ProblemError(f"--tolerance must lie between 0 and 1, not {options.tolerance:g}.")
     solution = load(options.result)
     if options.compare is not None:
+        cli.refuse(options, "--compare replays neither result", _REPLAY, _DRY)
         return _compare(options, solution, load(options.compare))
     problem, recorded = solution.problem, solution.certificate
     with cli.status_line(options) as line:
@@ -307,10 +312,10 @@ of a smooth body). Joints count from tail to head; angles are positive counter-c
     cli.MAX_SPEED,
     *cli.ROBOT,
     cli.option(int, "--periods", "N", "repeat the period N times (default: 1)", 1),
-    cli.option(str,
-        "--ramp", None, "begin straight, at rest, before time 0 (default)", default=True,
-        action=argparse.BooleanOptionalAction,
-    ),
+    ("--ramp", {
+        "action": argparse.BooleanOptionalAction, "default": True,
+        "help": "begin straight, at rest, before time 0 (default)",
+    }),
     cli.option(
         str, "--format", None, "default: --output's, else csv",
         choices=("csv", "json", "mjcf", "urdf"),

@@ -182,17 +182,13 @@ def _columns(
 
 
 def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Column], str]:
-    def refuse(what: str) -> NoReturn:
-        raise ProblemError(
-            f"{path}: {what}: call columns of joints joint_1 (at the tail), joint_2 ..."
-        )
-
     angles = [column for column in columns if column.kind == "angle"]
     places = [column for column in columns if column.kind == "place"]
     if not angles and places:
-        refuse(
+        _refuse(
+            path,
             f"its columns {_ends(places)} look like positions of points of the body; write joint "
-            f"angles, each the direction of a link less that of the link behind it"
+            f"angles, each the direction of a link less that of the link behind it",
         )
     measured = [column for column in angles if not column.last("commanded")]
     if len(angles) > n_joint <= len(measured):
@@ -208,32 +204,40 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
         if "#" in key or (not key and n_joint > 1):
             numbered.append(sorted(each, key=lambda column: (column.numbers, column.words)))
             if len({column.words for column in each}) < len(each):
-                refuse(f"two columns are called {each[0].name}")
+                _refuse(path, f"two columns are called {each[0].name}")
     full = [each for each in numbered if len(each) == n_joint]
     if len(full) > 1:
         sides = f"{_ends(full[0])}, and {_ends(full[1])}"
-        refuse(f"two sets of columns may be the {n_joint} joints, {sides}; leave one of them out")
+        _refuse(
+            path, f"two sets of columns may be the {n_joint} joints, {sides}; leave one of them out"
+        )
     of_links = full and full[0][0].last("link") and "joint" not in full[0][0].words
     if full and not of_links:
         return full[0], "by name"
     if links := full or [each for each in numbered if len(each) == n_joint + 1]:
-        refuse(
+        _refuse(
+            path,
             f"{_ends(links[0])} are {len(links[0])} columns of angles, and the body has {n_joint} "
-            f"joints; if they are directions of links, write what each has beyond the one behind it"
+            "joints; if they are directions of links, write what each has beyond the one behind it",
         )
     if len(angles) != n_joint:
         _refuse_count(path, len(angles), n_joint)
     in_order = all(each == [column for column in angles if column in each] for each in numbered)
     if not in_order or any(column.last("end") for column in angles):
-        refuse(f"the order of the columns {', '.join(c.name for c in angles)} is not clear")
+        _refuse(path, f"the order of the columns {', '.join(c.name for c in angles)} is not clear")
     return angles, "in the file's order, tail to head,"
 
 
 def _refuse_count(path: Path, count: int, n_joint: int) -> NoReturn:
-    raise ProblemError(
-        f"{path} has {count} column{'s' * (count != 1)} of angles, and the body has {n_joint} "
-        f"joint{'s' * (n_joint != 1)}: write a column of times, then one for each joint."
+    _refuse(
+        path,
+        f"it has {count} column{'s' * (count != 1)} of angles, and the body has {n_joint} "
+        f"joint{'s' * (n_joint != 1)}; write a column of times, then one for each joint",
     )
+
+
+def _refuse(path: Path, what: str) -> NoReturn:
+    raise ProblemError(f"{path}: {what}: call columns of joints joint_1 (at the tail), joint_2 ...")
 
 
 def _times(path: Path, table: Table, clock: list[_Column]) -> tuple[np.ndarray, str]:

@@ -141,16 +141,12 @@ def _picture(
         figure.savefig(text, format="svg", transparent=True, metadata=without)
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
-    for pattern, new in (
-        (r"(?s)<style.*?</style>", ""),  # it would style the whole page
-        (r' xmlns(:\w+)?="[^"]*"', ""),
-        (r'<g id="[^"]*"', "<g"),  # the same in every panel
-        (
-            r'<svg [^>]*viewBox="([^"]*)"[^>]*>',
-            rf'<svg viewBox="\1" role="img" aria-label="{escape(caption)}">',
-        ),
-    ):
-        svg = re.sub(pattern, new, svg)
+    # styles would be those of the whole page, and names are the same in every panel
+    svg = re.sub(r'(?s)<style.*?</style>| xmlns(:\w+)?="[^"]*"|(?<=<g) id="[^"]*"', "", svg)
+    label = f'role="img" aria-label="{escape(caption)}"'  # may hold a backslash
+    svg = re.sub(
+        r'<svg [^>]*viewBox="([^"]*)"[^>]*>', lambda x: f'<svg viewBox="{x[1]}" {label}>', svg
+    )
     # hundredths of a point
     svg = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)
     axes = figure.axes[0]

@@ -68,6 +68,7 @@ sweep study.py --chunk 0 -> --chunk must be at least 1
 sweep study.py --output z.h5 -> z.h5 should end in .nc; a folder of that name is written z.h5/
 sweep study.py --output text.h5/x -> cannot write text.h5/x/quick.nc: Not a directory
 verify | nope.h5 | text.h5 | problem.py | good.h5 --tolerance 0 | good.h5 --tolerance nan
+verify good.h5 --compare good.h5 --tolerance 1e-8 --dry -> leave --tolerance, --dry out
 verify LONG -> File name too long
 verify | good.h5 --compare | good.h5 --compare nope.h5 | text.h5 --compare good.h5
 report | nope.h5 | text.h5 | good.h5 --problem nope.py | good.h5 --period 1

@@ -117,7 +117,7 @@ REFUSED = {
         "line 1, has 4 cells, and the lines below have .* decimal commas"),
     "joints by turns": ("t,q1,q2,q3\n" + "".join(f"{s},{x:.4f},,\n{s},,{x:.4f},\n{s},,,{x:.4f}\n" for s, x in zip(SECONDS, A, strict=True)),
         "only 0 of 180 lines .* write all joints in every line"),
-    "lists in cells": ("t,positions\n" + "".join(f'{s},"[{a}, {a}]"\n' for s, a in zip(SECONDS, A, strict=True)), "0 columns of angles"),
+    "lists in cells": ("t,positions\n" + "".join(f'{s},"[{a}, {a}]"\n' for s, a in zip(SECONDS, A, strict=True)), "0 columns of angles, and the body has 3 joints; write a column of times, then one for each joint: call columns of joints joint_1"),
     "another time": ("t,q1,q2,q3\n" + table([f"31.01. {k}h" for k in range(60)], A, B, C), "line 2: the time .* write seconds"),
     "one instant": (table(np.ones(60), A, B, C), "all times are 1"),
     "JSON": (b'{"time_s": [0, 1]}', "is no text of numbers"),

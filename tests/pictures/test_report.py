@@ -14,6 +14,7 @@ import pytest
 
 from colloc.commands.results import report as main
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
+from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
@@ -130,7 +131,8 @@ def test_everything_from_the_file_is_escaped(three_link):
     answer = replace(three_link.answer, history=history)
     versions = {EVIL: EVIL, "colloc": EVIL}
     certificate = replace(three_link.certificate, checks=checks)
-    evil = Solution(three_link.problem, answer, certificate, 1.0, EVIL, EVIL, versions)
+    problem = three_link.problem.with_(objective=Objective("distance / work", name=f"\\eta {EVIL}"))
+    evil = Solution(problem, answer, certificate, 1.0, EVIL, EVIL, versions)
     page = report_page(evil, Reference(0.2, 0.1, EVIL), EVIL)
     seen = outline(page)
     assert "<img" not in page

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 import colloc
 from colloc.commands.main import main
 from colloc.pictures.report_page import report_page
-from colloc.results.robot import joint_torques
+from colloc.results.robot import Robot, joint_torques
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
 SLOW = SIZE | {"period": 5000.0}
@@ -165,6 +165,15 @@ def test_weak_motors_are_told_whether_a_longer_period_helps(three_link):
         weak
     )
     assert f"torque_limit=({4 / weak.torque_unit:.4g}, {1.5 / weak.torque_unit:.4g})" in str(weak)
+
+
+def test_weak_motors_are_told_of_where_the_motion_with_inertia_is_not_found(
+    three_link, monkeypatch
+):
+    monkeypatch.setattr(Robot, "_with_inertia", None)
+    sheet = str(three_link.robot(**SIZE, max_torque=1.5))
+    assert "Motors are too weak in slow motion as well" in sheet
+    assert "the effect of inertia at this pace" in sheet
 
 
 def test_where_torques_depend_on_the_pace_no_other_pace_is_promised(unsolved):
