@@ -194,11 +194,14 @@ class OwnLaw:
         return tuple(rows)
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        # the trace in every direction: no less than the secant of a law that grows with the speed
+        # the trace of the slopes alone is too small where each component is dry on its own
         (ss, _), (_, nn) = self.density_jacobian(vs, vn, delta)
         zero = 0.0 * ss
-        trace = regularised_speed(ss + nn, zero, _LEAST + zero)  # positive for any law
-        return (trace, zero), (zero, trace)
+        along, across = (
+            regularised_speed(ss + nn, f * v / regularised_speed(v, delta, _LEAST) ** 2, _LEAST)
+            for f, v in zip(self.density(vs, vn, delta), (vs, vn), strict=True)
+        )
+        return (along + zero, zero), (zero, across + zero)
 
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
         raise NotImplementedError("formulas need not be the gradient of a function.")
