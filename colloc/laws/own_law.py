@@ -91,7 +91,7 @@ class OwnLaw:
             )
         gain = fs * vs + fn * vn
         if (gain >= 0).any():
-            worst = np.unravel_index(np.argmax(gain / np.hypot(vs, vn)), gain.shape)
+            worst = 0, np.argmax(gain / np.hypot(vs, vn))
             raise ProblemError(
                 f"friction: at (vs, vn) = ({vs[worst]:.3g}, {vn[worst]:.3g}) the force "
                 f"({fs[worst]:.3g}, {fn[worst]:.3g}) does not oppose the motion, so friction would "
@@ -194,14 +194,13 @@ class OwnLaw:
         return tuple(rows)
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        # the trace of the slopes alone is too small where each component is dry on its own
+        # the trace alone is nearly 0 where both components are dry on their own
         (ss, _), (_, nn) = self.density_jacobian(vs, vn, delta)
-        zero = 0.0 * ss
         along, across = (
-            regularised_speed(ss + nn, f * v / regularised_speed(v, delta, _LEAST) ** 2, _LEAST)
+            regularised_speed(ss + nn, f * v / (v * v + delta * delta + _LEAST**2), _LEAST)
             for f, v in zip(self.density(vs, vn, delta), (vs, vn), strict=True)
         )
-        return (along + zero, zero), (zero, across + zero)
+        return (along, 0.0 * ss), (0.0 * ss, across)
 
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
         raise NotImplementedError("formulas need not be the gradient of a function.")
