@@ -15,6 +15,7 @@ from colloc.smooth.balance import Motion, solve_smooth
 from colloc.smooth.prescribed_body import Wave
 from colloc.system.errors import OrderWarning
 from colloc.verification.differential_motion import checked_chain
+from colloc.verification.dry_friction import dry_friction
 from colloc.verification.trajectory import plan_trajectory
 
 GAIT = colloc.ellipse(0.0, 1.2, 0.8)
@@ -23,6 +24,22 @@ ON = {"body": Chain(), "friction": Friction(), "gait": GAIT, "delta": 1e-2}
 AT = (Chain(), Friction())
 TINY = 1e-9
 ONES = np.ones((2, 4))
+DRAG = colloc.Viscous(normal=2, tangential=1)
+BUMP = np.sin(2 * np.pi * np.arange(50) / 50)
+MIRRORED = Harmonic(1, "bilateral")
+SAMPLES = [[0.1, 0.1, 0.1], [0.5, 0.5, 0.5], [2.0, 2.0, 2.0]]
+
+
+class Belt(Chain):
+    """One motor for both joints: the kernel would read what is not there."""
+
+    n_joint = 1
+    solve = None
+
+
+def driven(body=None, **said):
+    gait = colloc.Coupled(Harmonic(1), **said)
+    return Problem("c", body=body or Chain((0.25,) * 4), gait=gait)
 
 
 def motion(stages, antipodal=False):
@@ -47,7 +64,7 @@ def path(angles, rates):
 
 
 NAMES = {name: getattr(colloc, name) for name in colloc.__all__} | globals()
-NAMES |= {each.__name__: each for each in (checked_chain, Wave, solve_smooth)}
+NAMES |= {each.__name__: each for each in (checked_chain, dry_friction, Wave, solve_smooth)}
 
 
 def cases(text, separator, most=-1):
@@ -246,6 +263,121 @@ Polygon(colour=1) -> it takes corners, symmetry, axis
 solve(5) -> problem must be a Problem
 solve(PROBLEM, starts=0) -> starts must be a whole number of at least 1
 solve(PROBLEM, seconds=np.nan) -> seconds must be .*, not nan
+Chain((0.3, 0.3, 0.4 + 1e-3)) -> must add up to
+Chain((0.3, 0.3, 0.4 - 1e-3)) -> must add up to
+Chain((0.3, 0.3, 0.4 + 1e-10)) -> must add up to
+Chain(weights=(0.5, 0.5, 0.5)) -> body\.weights
+Chain(weights=(0.5, 0.5, 0.0)) -> body\.weights
+Chain(weights=(0.5, 0.5, "x")) -> body\.weights
+Chain(weights=(0.5, 0.5, np.nan)) -> body\.weights
+Chain(weights=(1.0,)) -> one for each of the 3 links
+Chain(weights=3.0) -> sequence of numbers
+Chain(masses=(0.5, 0.5)) -> one for each of the 3 links
+Chain(masses=(0.5, 0.5, 0.5)) -> the body's mass 1
+Chain(inertias=(0.1, -0.1, 0.1)) -> not negative
+Chain(inertias=(0.1, 0.1)) -> one for each of the 3 links
+Chain(feet=(Foot(0), Foot(3))) -> numbered 0 to 2
+Chain(feet=(Foot(0, weight=0.5), Foot(2, weight=0.4))) -> add up to 1, not 0.9
+Chain(feet=(Foot(0, 1.0, 0.5), Foot(1, 0.0, 0.5))) -> at two points at least
+Chain(feet=(Foot(0), Foot(2))) -> no foot is on link 1
+Chain(feet=(Foot(0, weight=1.0),)) -> two points
+Chain(feet=(Foot(0), Foot(1, offset=0.1), Foot(2))) -> left and right
+Chain(feet=(Foot(0), Wheel(1, angle=0.3), Foot(2))) -> left and right
+Chain(feet=(Pad(0, offset=0.1), Pad(1), Pad(2))) -> left and right
+Chain(feet=(Foot(0, 0.2, 1 / 3), Foot(0), Foot(1), Foot(2))) -> bear all that
+Chain(feet=-1) -> 0 \(a line\) to
+Chain(feet="many") -> sequence of Foot
+Chain(feet=0.5) -> sequence of Foot
+Foot(0, place=1.2) -> must lie on its link
+Foot(0, place=float("nan")) -> must lie on its link
+Foot(0.5) -> whole number
+Foot(0, weight=0.0) -> positive part
+Foot(0, offset=float("inf")) -> offset of a foot
+Foot(0, friction="oil") -> law of friction
+Foot(0, plaze=0.5) -> did you mean place
+Foot(0, 0.9, extent=0.4) -> must lie on its link
+Foot(0, extent=-0.4) -> from 0 \(a point\) to 1
+Pad(0, 0.2, 1.2) -> must lie on its link
+Pad(0, 0.6, 0.4) -> must end behind where it begins
+Pad(0, "tail", 0.4) -> first must be a number, not 'tail'
+Pad(0, angle=0.3) -> may be turned
+Wheel(0, friction=Friction()) -> take Foot
+Friction(mu_t=-1) -> mu_t
+Friction(mu_f=0) -> mu_f
+Friction(mu_b=np.nan) -> mu_b
+Friction(mu_t=np.inf) -> mu_t
+Friction(mu_f="1") -> mu_f
+solve_balance(*AT, ONES, ONES, 0.0) -> delta
+solve_balance(*AT, ONES, ONES, -1e-4) -> delta
+solve_balance(*AT, ONES, ONES, np.nan) -> delta
+solve_balance(*AT, np.zeros((3, 4)), ONES, 1e-4) -> shape
+solve_balance(*AT, ONES, ONES, 1e-4, start=np.zeros((2, 4))) -> start
+solve_balance(*AT, ONES, ONES, 1e-4, method="magic") -> method
+solve_balance(*AT, ONES, ONES, 1e-4, load=np.ones((3, 4))) -> load must be
+solve_balance(*AT, ONES, ONES, 1e-4, load=np.full((2, 4), np.nan)) -> load must be
+solve_balance(*AT, ONES, ONES, 1e-4, load="x") -> load must be
+driven(stuck={5: 0.1}) -> joint 5: the chain has joints 0 to 2
+driven(stuck={0: 4.0}) -> between -pi and pi
+driven(stuck={0: 0.0, 1: 0.0, 2: 0.0}) -> all joints are stuck
+driven(stuck={0: 3.0, 1: 3.0}, gears=((0,), (0,), (1,))) -> links cross
+driven(gears=((1, 0), (0, 1))) -> 2 rows, and the chain has 3 joints
+driven(gears=((1, 0), (0, 1), (0, 0))) -> joint 2 .* hangs on no motor
+driven(gears=((1, 0), (0, 1), (1, 1)), stuck={2: 0.0}) -> is stuck, and hangs on a motor
+driven(gears=((1, 1), (1, 1), (1, 1))) -> two motors do the same
+driven(gears="belts") -> a row of numbers for each joint
+driven(gears=3) -> a row of numbers for each joint
+driven(stuck=5) -> stuck gives joints and their angles
+driven(stuck=[1, 2]) -> stuck gives joints and their angles
+driven(stuck=[(1, 0.1), (1, 0.2)]) -> each is named once
+driven(ModalBody(3)) -> joints of a Chain
+driven(stuck={1: 0.4}).with_(froude=0.05) -> joints all have motors
+driven(stuck={1: 0.4}).with_(grade=0.05) -> slope
+driven(gears=((1,),) * 3) -> on 1 motor.* goes anywhere
+Coupled(Chain(), stuck={1: 0.4}) -> gait=Coupled\(Harmonic\(1\), stuck=
+slope_motion(CrawlerBody(), Friction(), GAIT, 1e-2, 0.1) -> only a Chain
+slope_motion(Belt(), Friction(), GAIT, 1e-2, 0.1) -> only a Chain, whose joints are its own, can be put on a slope, not Belt
+slope_motion(**ON, grade=-0.1) -> grade must be a number that is not negative
+slope_motion(**ON, grade=np.nan) -> grade must be
+slope_motion(**ON, grade=0.1, periods=0) -> periods must be a whole number from 1
+slope_motion(**ON, grade=0.1, heading=np.nan) -> heading must be a number or None, not nan
+slope_motion(**ON, grade=0.1, theta="up") -> theta must be a number or None
+slope_motion(**ON, grade=0.1, tolerance=0.0) -> tolerance must be a positive finite number
+slope_motion(*AT, GAIT, -1.0, 0.1) -> delta must be a positive finite number
+motion_from_rest(**ON, froude=0.1, periods=0) -> whole number
+inertial_motion(**ON, froude=0.0) -> froude must be
+slow_enough(ModalBody(), Friction(), GAIT, 1e-2) -> of a ModalBody
+slow_enough(Chain(), DRAG, GAIT, 1e-2) -> pace is part
+slow_enough(**ON, loss=0.9) -> at most
+dry_friction(Chain(), Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5), GAIT) -> no bounds for delta = 0
+dry_friction(Chain(), DRAG, GAIT) -> no bounds for delta = 0
+dry_friction(ModalBody(2), Friction(), GAIT) -> not for a ModalBody
+efficiency_bound(*AT, 4.0) -> joint_limit
+efficiency_bound(Chain((1 / 6,) * 6), Friction(), 2.0) -> 5 links
+fitted_friction("nowhere.csv") -> cannot read .*nowhere.csv
+fitted_friction(np.ones((2, 3))) -> a row for each of at least 3 speeds
+fitted_friction([[0.1, 0.5, 0.9], [0.2, np.nan, 0.9], [0.3, 0.5, 0.9]]) -> sample 2: along is nan
+fitted_friction([[0.1, 0.5, 0.9], [0.2, "rough", 0.9], [0.3, 0.5, 0.9]]) -> sample 2: along is 'rough'
+fitted_friction([[0.1, 0.5, 0.9], [0.2, None, 0.9], [0.3, 0.5, 0.9]]) -> sample 2: along is None
+fitted_friction(SAMPLES, length=1.0) -> take both
+fitted_friction(SAMPLES, length=-1.0, period=2.0) -> length
+Problem("x", friction=DRAG, gait=BSpline(6, 1)) -> work depends on the pace under .*; use Harmonic
+Problem("x", friction=DRAG, gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
+Problem("x", friction=PowerLaw(0.5), gait=BSpline(6, 1)) -> work depends on the pace under .*; use Harmonic
+Problem("x", friction=PowerLaw(0.5), gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
+Problem("x", body=Chain((0.5, 0.5)), friction=DRAG, gait=Harmonic(2)) -> scallop theorem
+OwnLaw("vs/speed", "-vn/speed") -> does not oppose the motion
+OwnLaw("-vs/speed", "-vn/speed + 0.1*vn/speed*exp(speed)") -> does not oppose the motion
+OwnLaw("-vs/speed", "0.1*vn/(1 + speed)") -> does not oppose the motion
+OwnLaw("-vs/speed - 0.5*vn/speed", "-vn/speed") -> left and right
+OwnLaw("-vs/abs(vs + 1) - where(vs < 0, 0, 1e-9)", "-vn") -> rest
+OwnLaw("-vs/(speed - speed)", "-vn") -> no finite value
+OwnLaw("-vs/speed", "where(vs > 0, -2, -1.5)*vn/speed") -> jumps where vs changes its sign
+OwnLaw("-vs", "-vn - where(vn > 0, 1, -1)*where(vn*vn > 0, 1, 0)") -> jumps where vn changes its sign
+OwnLaw("-vs/speeed", "-vn") -> speaks of speeed
+OwnLaw("-vs +", "-vn") -> is no formula
+OwnLaw("-vs.real", "-vn") -> is no formula that can be differentiated
+OwnLaw("__import__('os')", "-vn") -> is no formula|speaks of
+OwnLaw("-vs**vs", "-vn") -> exponent
 """
 
 
@@ -253,6 +385,121 @@ solve(PROBLEM, seconds=np.nan) -> seconds must be .*, not nan
 def test_what_cannot_be_meant_is_refused_in_a_sentence(made, words):
     with pytest.raises(ProblemError, match=words):
         eval(made, NAMES)
+
+
+STATED = r"""
+joint_limit=((0.0, 1.0), 1.0) -> straight body
+joint_limit=((-1.0, 0.0), 1.0) -> straight body
+joint_limit=((-1.0, 3.142), 1.0) -> neither beyond 3.142
+joint_limit=((-30, 60), 1.0) -> radians
+joint_limit=3.142 -> lie in \(0, pi\], not 3.142
+joint_limit=(1.0, 0.0) -> lie in \(0, pi\], not 0
+joint_limit="wide" -> not 'wide'
+joint_limit=(True, 1.0) -> joint_limit
+joint_limit=((-1, 1, 2), 1.0) -> least and its largest
+joint_limit=((-1, 2),) -> give one for all joints
+joint_limit=((-1, 2), (-1, 2)), gait=MIRRORED -> mirrored joints
+joint_limit=((-1, 2), (-1, 2)), gait=Harmonic(1, "antipodal") -> both sides
+power_limit=1.0, gait=Polygon(4) -> leaves the pace open, but the joints' power is limited
+torque_limit=1.0, body=ModalBody(2), gait=Harmonic(1) -> needs the forces
+torque_limit=-1.0 -> torque_limit must be positive
+power_limit="much" -> power_limit must be positive
+power_limit=(1.0, 2.0, 3.0) -> power_limit has 3 values
+torque_limit=(1.0, 2.0), gait=MIRRORED -> give them the same torque_limit
+speed_limit=5.0, gait=Polygon(3) -> leaves the pace open, but the joints' speed is limited
+speed_limit=0.2, gait=MIRRORED -> leaves no gait
+speed_limit=0.5, gait=MIRRORED -> with speed_limit the usual first gait
+speed_limit=5.0, body=Wave() -> nothing is free in a prescribed motion
+speed_limit=(5.0, 8.0), gait=MIRRORED -> give them the same speed_limit
+speed_limit=(5.0, 8.0, 5.0) -> has 3 values
+speed_limit=-1.0 -> positive and finite
+limits=[PathLimit("heat", "moment**2", (1.0, 1.0, 1.0))] -> has 3 values; give one, or 2
+limits=[PathLimit("speed", "rate", 9.0)], gait=Polygon(4) -> the speed is limited
+limits=["moment < 1"] -> PathLimit
+limits=3 -> PathLimit
+limits=[PathLimit("heat", "moment**2", -1.0)] -> must be positive
+limits=[PathLimit("heat", "moment**2", "x")] -> must be positive
+objective="driven efficiency", formulation="implicit velocity" -> formulation 'full'
+objective=Objective("distance / heat") -> speaks of heat
+objective=Objective("1 / mine", quantities=[Quantity("mine", "moment**2")]) -> no sum over the joints
+objective=Objective("1 / work", quantities=[Quantity("work", "sum(rate)")]) -> a name of its own
+froude=-1.0 -> not negative
+froude="fast" -> not negative
+froude=0.1, gait=MIRRORED -> run backwards
+froude=0.1, gait=Polygon(4) -> leaves the pace open
+froude=0.1, body=ModalBody(), gait=Harmonic(1) -> of a ModalBody
+froude=0.1, gait=Harmonic(1), grade=0.1, rotation=1.0 -> on a slope a body that a period turns
+froude=0.1, gait=Harmonic(1), grade=2.0 -> slides down for ever
+froude=0.1, gait=Harmonic(1), objective="driven efficiency" -> single joints
+froude=0.1, gait=Harmonic(1), scheme="lobatto-4" -> gauss-N
+froude=0.1, gait=Harmonic(1), formulation="implicit velocity" -> only the formulation
+froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(3, "antipodal") -> own axis of symmetry
+froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(2), rotation=1.0 -> never turn
+froude=(1.0, 0.1) -> the smaller one first
+froude=(-1.0, 0.1) -> above 0
+froude=(0.1, np.inf) -> two numbers
+froude=(0.1, 1.0, 2.0) -> two numbers
+froude=(0.1, 1.0), objective="1 / length" -> depends on it
+froude=(0.1, 1.0), objective="distance / period", gait=Polygon(4) -> of a class Harmonic
+objective="distance / period" -> state the pace
+grade=1.0 -> slides down for ever
+grade=-1.0 -> grade must be
+grade="steep" -> grade must be
+grade=0.1, gait=Polygon(symmetry="bilateral") -> no part of a period follows from another: take Polygon
+grade=0.1, body=CrawlerBody() -> only a Chain
+grade=0.1, objective="turning" -> the objective speaks of the rotation
+grade=0.1, rotation=0.1 -> a body that a period turns has no gait that repeats
+grade=0.1, formulation="implicit velocity" -> only the formulation 'full'
+grade=0.1, scheme="trapezoid" -> a gauss-N or radau-N scheme is needed
+grade=0.1, towards="up" -> towards must be a finite angle
+towards=1.0 -> towards is a direction on a slope
+body=Chain((0.5, 0.5)), gait=Harmonic(1, "antipodal") -> scallop
+gait=Polygon(2) -> it retraces its path, and reversed rates
+gait=Basis([BUMP]) -> it retraces its path, and reversed rates
+body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=MIRRORED -> read the same from both ends
+guess=ellipse(1.0, 1e-6, 0.7e-6), gait=MIRRORED -> hardly moves
+guess=ellipse(0.0, 1.0, 2 * np.pi / 3 + 1e-5), gait=MIRRORED -> cross
+guess=ellipse(np.pi - 1, 1.0 + 1e-5, 0.1), gait=MIRRORED -> beyond the limit
+"""
+
+
+@pytest.mark.parametrize(("fields", "words"), cases(STATED, " -> "))
+def test_a_problem_that_has_no_meaning_is_refused_in_a_sentence(fields, words):
+    with pytest.raises(ProblemError, match=words):
+        eval(f"Problem('x', {fields})", NAMES)
+
+
+TAKEN = """
+joint_limit=((-np.pi, 1), (-1, np.pi)), gait=Harmonic(1)
+guess=ellipse(0.0, 1.0, 2 * np.pi / 3), gait=MIRRORED
+limits=PathLimit("heat", "moment**2", 1.0)
+grade=3.0, friction=DRAG, objective="towing"
+gait=Polygon(2), friction=Friction(mu_t=1, mu_f=1, mu_b=2)
+gait=Basis([BUMP]), friction=Friction(mu_t=1, mu_f=1, mu_b=2)
+froude=0.1, body=Chain((0.4, 0.6)), gait=Harmonic(3, "antipodal"), friction=Friction(mu_t=2.0)
+froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(2)
+delta_start=0.0
+"""
+
+
+@pytest.mark.parametrize("fields", TAKEN.strip().splitlines())
+def test_what_lies_beside_it_is_taken(fields):
+    problem = eval(f"Problem('x', {fields})", NAMES)
+    assert Problem.from_dict(problem.to_dict()).hash == problem.hash
+
+
+@pytest.mark.parametrize(
+    ("name", "taken"),
+    [(f"tiny.{end}", False) for end in ("interrupted", "FAILED", "starts", "run", "shrunk")]
+    + [(name, False) for name in ("x.front", "x.start-7", "x.former-2", ".", "..", "--help", "-x")]
+    + [(name, True) for name in ("tiny.failed.2", "partial", "x.start", "_", "3.5", "a--help")],
+)
+def test_names_of_files_that_colloc_makes_beside_results_are_refused(name, taken):
+    if taken:
+        assert Problem(name).name == name
+    else:
+        with pytest.raises(ProblemError, match=r"name must (not end|be at most 200 letters)"):
+            Problem(name)
 
 
 LIMITS = """
@@ -345,45 +592,32 @@ def test_a_solution_refuses_what_cannot_be_meant(value, three_link, tmp_path, mo
     assert not list(tmp_path.iterdir())
 
 
-def test_what_a_problem_file_raises_is_told_even_if_it_cannot_say_itself(tmp_path):
-    text = "class Mute(Exception):\n    def __str__(self):\n        raise KeyError\nraise Mute\n"
-    (tmp_path / "x.py").write_text(text)
-    with pytest.raises(ProblemError, match="line 4: Mute"):
+FILES = {
+    "class Mute(Exception):\n    def __str__(self):\n        raise KeyError\nraise Mute\n": "line 4: Mute",
+    "\0": r"x.py: .*null bytes",
+    "raise ValueError('\\x1b]0;owned\\x07\\x1b[2J \\u202e backwards \\r gone')\n": r"\\x1b\[2J",
+}
+
+
+@pytest.mark.parametrize(("text", "words"), FILES.items())
+def test_what_a_problem_file_raises_is_told_and_cannot_drive_the_terminal(text, words, tmp_path):
+    (tmp_path / "x.py").write_text(text, encoding="utf-8")
+    with pytest.raises(ProblemError, match=words) as caught:
         colloc.load_problem(tmp_path / "x.py")
-    (tmp_path / "y.py").write_bytes(b"\x00")
-    with pytest.raises(ProblemError, match=r"y.py: .*null bytes"):
-        colloc.load_problem(tmp_path / "y.py")
+    assert str(caught.value).isprintable()
 
 
-@pytest.mark.parametrize("first", ["", "from __future__ import annotations\n"])
-def test_a_problem_file_may_define_dataclasses(first, tmp_path):
-    """As classes of gaits and laws of one's own are; they look for the module they stand in."""
-    text = """from dataclasses import dataclass
+SIZED = """from dataclasses import dataclass
 from colloc import Harmonic, Problem
 @dataclass(frozen=True)
 class Size:
     links: int = 3
 PROBLEM = Problem("sized", gait=Harmonic(1, "bilateral"))
 """
-    (tmp_path / "sized.py").write_text(first + text, encoding="utf-8")
+
+
+@pytest.mark.parametrize("first", ["", "from __future__ import annotations\n", "\ufeff"])
+def test_a_problem_file_may_define_dataclasses_and_begin_with_a_byte_order_mark(first, tmp_path):
+    """As classes of gaits and laws of one's own are; they look for the module they stand in."""
+    (tmp_path / "sized.py").write_text(first + SIZED, encoding="utf-8")
     assert colloc.load_problem(tmp_path / "sized.py").name == "sized"
-
-
-def test_a_wheel_with_another_law_is_told_to_be_a_foot():
-    with pytest.raises(colloc.ProblemError, match="take Foot"):
-        colloc.Wheel(0, friction=colloc.Friction())
-
-
-def test_a_problem_file_with_a_byte_order_mark_is_read(tmp_path):
-    text = "from colloc import *\nPROBLEM = Problem('x')\n"
-    (tmp_path / "x.py").write_bytes(b"\xef\xbb\xbf" + text.encode())
-    assert colloc.load_problem(tmp_path / "x.py").name == "x"
-
-
-def test_what_a_problem_file_raises_cannot_drive_the_terminal(tmp_path):
-    text = "raise ValueError('\\x1b]0;owned\\x07\\x1b[2J \\u202e backwards \\r gone')\n"
-    (tmp_path / "x.py").write_text(text)
-    with pytest.raises(ProblemError) as caught:
-        colloc.load_problem(tmp_path / "x.py")
-    assert str(caught.value).isprintable()
-    assert r"\x1b[2J" in str(caught.value)

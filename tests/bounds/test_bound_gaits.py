@@ -124,27 +124,6 @@ def test_a_bound_is_pinned_from_both_sides(isotropic):
     assert isotropic.floor == pytest.approx(0.480, rel=0.003)
 
 
-def test_a_sampled_bound_holds_at_random_motions_within_a_percent():
-    """How far samples can be trusted: motions that were never sampled exceed the coarse bound by
-    little."""
-    bound = efficiency_bound(Chain(), Friction(), 2.0, budget=ODD)
-    rng = np.random.default_rng(22)
-    turn = rng.uniform(0, 2 * np.pi, 8000)
-    motion = balanced_motion(
-        Chain(), Friction(), rng.uniform(-2, 2, (2, 8000)), np.stack([np.cos(turn), np.sin(turn)])
-    )
-    ratio = Samples(bound.potential_space(Chain()), motion).ratio(np.array(bound.coefficients))[0]
-    assert ratio.max() < 1.05 * bound.sampled
-
-
-def test_infinitesimal_triangle_reaches_two_fifths():
-    """Design value derived for shapes (c, -c) with c > 1.8: two joints one after the other, then
-    undone together."""
-    gait = small_gait(Chain(), Friction(), np.array([2.2, -2.2]), directions=360)
-    assert abs(gait.efficiency - 0.4) < 1e-4
-    np.testing.assert_allclose(gait.rates @ gait.weights, 0.0, atol=1e-9)
-
-
 def test_small_gaits_at_the_fold_generate_their_directions():
     """0.45606 at (pi, 0) from any first set of directions: the creases are found, where fixed sets
     stop at 0.452."""

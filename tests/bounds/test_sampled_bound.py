@@ -328,15 +328,6 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
         efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
 
 
-@pytest.mark.parametrize(
-    ("body", "limit", "match"),
-    [(Chain(), 4.0, "joint_limit"), (Chain((1 / 6,) * 6), 2.0, "5 links")],
-)
-def test_impossible_requests_are_refused(body, limit, match):
-    with pytest.raises(ProblemError, match=match):
-        efficiency_bound(body, Friction(), limit)
-
-
 @pytest.mark.parametrize("lengths", [(0.4, 0.6), (0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
 def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
     """The midpoint of the middle link, or the middle joint along the mean heading there, from
@@ -400,36 +391,6 @@ def test_no_bound_says_less_than_friction_alone():
     coarse = Budget(2, (1,), 6, 8, 1, starts=10)
     bound = efficiency_bound(Chain(feet=1), Friction(0.5, 0.5, 0.5), budget=coarse)
     assert bound.sampled == 2.0
-
-
-def test_lattices_of_four_links_have_other_directions_everywhere_and_creases_where_joints_rest():
-    domain = Domain(Chain((0.25,) * 4), Friction(), 2.5)
-    one, other = domain.lattice(4, 10, 0.2), domain.lattice(4, 10, 0.4)
-    resting = (one.rates == 0).sum(axis=0)
-    assert set(resting) == {0, 1, 2}
-    assert 0.3 < (resting == 1).sum() / (resting < 2).sum() < 0.7
-    buckles = np.abs(one.rates.T @ np.array([1, -2, 1])) > (1 - 1e-9) * np.sqrt(6)
-    drawn = one.rates[:, (resting == 0) & ~buckles]
-    assert np.unique(drawn, axis=1).shape == drawn.shape
-    assert not np.isin(drawn, other.rates).any()
-
-
-def test_lattices_of_five_links_are_no_larger_than_those_of_four():
-    """They hold what a tensor grid would: joints at their limit and straight, and shapes where
-    links just touch."""
-    sizes = [Domain(Chain((1 / n,) * n), Friction(), 3.0).lattice(4, 10, 0.2).size for n in (4, 5)]
-    assert sizes[1] < 2 * sizes[0]
-    domain = Domain(Chain((0.2,) * 5), Friction(), 3.0)
-    shapes = np.unique(domain.lattice(6, 10, 0.2).angles, axis=1)
-    assert domain.holds(shapes).all()
-    free = (np.abs(shapes) < 2.97).all(axis=0)
-    touching = ~domain.holds(1.01 * shapes)[free]
-    for special in (
-        np.isclose(np.abs(shapes), 3.0).any(axis=0),
-        (shapes == 0.0).any(axis=0),
-        touching,
-    ):
-        assert 0.05 < special.mean() < 0.95
 
 
 def test_climbs_go_along_creases_where_one_joint_rests():

@@ -1,5 +1,4 @@
-"""Gaits with inertia on a slope: against differences, the limits slow and level, a body that sets
-out from rest, and files."""
+"""Gaits with inertia on a slope: against differences, the limits slow and level, and from rest."""
 
 import numpy as np
 import pytest
@@ -14,22 +13,14 @@ from colloc.search.iterate import space_near
 from colloc.verification.differential_motion import inertial_motion
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[1.17], [0.12]], sin=[[0.0], [-0.91]], theta=0.7)
-BODY, FRICTION, DELTA = (
-    colloc.Chain((0.3, 0.45, 0.25)),
-    colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3),
-    1e-2,
-)
+BODY, FRICTION = colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
+DELTA = 1e-2
 
 
 def problem(**fields):
-    usual = {
-        "gait": colloc.Harmonic(1),
-        "guess": LEANING,
-        "grade": 0.2,
-        "froude": 0.1,
-        "delta": DELTA,
-    }
-    return colloc.Problem("gliding", **({"body": BODY, "friction": FRICTION} | usual | fields))
+    usual = {"gait": colloc.Harmonic(1), "grade": 0.2, "froude": 0.1, "delta": DELTA}
+    usual |= {"body": BODY, "friction": FRICTION}
+    return colloc.Problem("gliding", LEANING, **(usual | fields))
 
 
 def motion_of(stated):
@@ -37,21 +28,14 @@ def motion_of(stated):
     return ReducedMotion(control_problem(stated).dynamics, space.mesh, space), v
 
 
-def played(grade, froude, towards=None):
-    return inertial_motion(
-        BODY,
-        FRICTION,
-        LEANING,
-        DELTA,
-        froude,
-        tolerance=1e-6,
-        regime=Regime(grade=grade, towards=towards),
-    )
+def played(**slope):
+    regime = Regime(**slope) if slope else None
+    return inertial_motion(BODY, FRICTION, LEANING, DELTA, 0.1, tolerance=1e-6, regime=regime)
 
 
 def test_a_collocated_period_is_the_one_that_is_followed_from_instant_to_instant():
     motion, v = motion_of(problem(towards=0.4, intervals=120))
-    collocated, followed = motion.values(v, DELTA), played(0.2, 0.1, 0.4)
+    collocated, followed = motion.values(v, DELTA), played(grade=0.2, towards=0.4)
     for name in ("distance", "work", "rotation"):
         assert collocated[name] == pytest.approx(followed.values[name], abs=2e-5)
 
@@ -64,9 +48,8 @@ def test_gradients_are_those_of_differences(pace):
     gradients, step = motion.gradients(v, DELTA), 1e-5 * np.linspace(-1.0, 1.0, v.size)
     after, before = (motion.values(v + sign * step, DELTA) for sign in (1, -1))
     for name in gradients:
-        assert gradients[name] @ step == pytest.approx(
-            0.5 * (after[name] - before[name]), rel=1e-6, abs=1e-12
-        )
+        difference = 0.5 * (after[name] - before[name])
+        assert gradients[name] @ step == pytest.approx(difference, rel=1e-6, abs=1e-12)
 
 
 def test_slower_and_slower_it_is_the_slow_motion_on_a_slope_to_first_order():
@@ -78,8 +61,7 @@ def test_slower_and_slower_it_is_the_slow_motion_on_a_slope_to_first_order():
 
 
 def test_the_flatter_the_slope_the_nearer_it_is_to_the_level():
-    level = inertial_motion(BODY, FRICTION, LEANING, DELTA, 0.1, tolerance=1e-6)
-    flat = played(1e-9, 0.1)
+    level, flat = played(), played(grade=1e-9)
     assert flat.work == pytest.approx(level.work, rel=1e-5)
     assert np.hypot(*flat.states[4:6, -1]) == pytest.approx(level.distance, rel=1e-5)
     assert flat.states[3, -1] - flat.states[3, 0] == pytest.approx(level.rotation, abs=1e-5)
@@ -95,11 +77,8 @@ def test_a_gait_is_found_and_certified_and_kept(found, tmp_path):
     assert found.status == "solved", found.message
     assert {check.name for check in found.certificate.checks} >= {"stability", "net rotation"}
     read = colloc.load(colloc.save(found, tmp_path / "gliding.h5"))
-    assert (read.problem.regime, read.certificate) == (
-        Regime(grade=0.05, froude=0.03),
-        found.certificate,
-    )
-    assert read.gait.theta == found.gait.theta
+    assert read.problem.regime == Regime(grade=0.05, froude=0.03)
+    assert (read.certificate, read.gait.theta) == (found.certificate, found.gait.theta)
 
 
 def test_from_rest_a_body_comes_to_the_same_periods(found):
@@ -112,10 +91,8 @@ def test_from_rest_a_body_comes_to_the_same_periods(found):
 
 @pytest.fixture(scope="module")
 def slow():
-    gait = colloc.Harmonic(1, "bilateral")
-    return colloc.solve(
-        colloc.Problem("uphill", gait=gait, delta=DELTA, grade=0.1, mesh_tolerance=3e-4), starts=1
-    )
+    asked = {"gait": colloc.Harmonic(1, "bilateral"), "grade": 0.1, "mesh_tolerance": 3e-4}
+    return colloc.solve(colloc.Problem("uphill", delta=DELTA, **asked), starts=1)
 
 
 @pytest.mark.parametrize("which", ["found", pytest.param("slow", marks=pytest.mark.slow)])
@@ -126,9 +103,8 @@ def test_torques_of_a_robot_lift_its_weight_too(which, request):
     grade, cosine = solution.problem.grade, np.cos(np.arctan(solution.problem.grade))
     pace = solution.froude or 1e-6  # so slow that inertia takes nothing
     robot = solution.robot(length=1.0, mass=2.0, period=(1.0 / (9.81 * cosine * pace)) ** 0.5)
-    assert robot.facts["work_per_period_J"] == pytest.approx(
-        2.0 * 9.81 * cosine * solution.work, rel=1e-4
-    )
+    work = 2.0 * 9.81 * cosine * solution.work
+    assert robot.facts["work_per_period_J"] == pytest.approx(work, rel=1e-4)
     x, y, z = (float(part) for part in mjcf(robot).split('gravity="')[1].split('"')[0].split())
     assert np.hypot(x, y) / abs(z) == pytest.approx(grade)
     assert np.hypot(np.hypot(x, y), z) == pytest.approx(9.81)

@@ -1,5 +1,4 @@
-"""States on a mesh whose rates depend on them, one to three: the differential equation, the order,
-adjoints, symmetry."""
+"""One to three states on a mesh whose rates depend on them: order, adjoints, symmetry."""
 
 import numpy as np
 import pytest
@@ -35,28 +34,17 @@ def on_mesh(mesh, ode):
 
 
 def followed(rates, start, t):
-    run = solve_ivp(
-        lambda t, s: rates(np.array([t]), s[:, None])[:, 0],
-        (0, t[-1]),
-        start,
-        t_eval=t,
-        rtol=1e-11,
-        atol=1e-12,
-    )
-    return run.y
-
-
-def settled(rates, k):
-    """The state at phase 0 after many periods."""
-    return followed(rates, np.zeros(k), np.array([0.0, 30.0]))[:, -1]
+    at = lambda t, s: rates(np.array([t]), s[:, None])[:, 0]  # noqa: E731
+    return solve_ivp(at, (0, t), start, rtol=1e-11, atol=1e-12).y[:, -1]
 
 
 @pytest.mark.parametrize("k", SIZES)
 @pytest.mark.parametrize("free", [False, True])
 def test_they_converge_to_the_differential_equation_with_the_order_of_the_scheme(k, free):
     ode, errors = spring(k), []
-    start = settled(ode[0], k) if free else np.linspace(0.5, 1, k)
-    exact = followed(ode[0], start, np.array([0.0, 1.0]))[:, -1]
+    # a free start is the state at phase 0 after many periods
+    start = followed(ode[0], np.zeros(k), 30.0) if free else np.linspace(0.5, 1, k)
+    exact = followed(ode[0], start, 1.0)
     for n in (10, 20):
         mesh = Mesh(scheme("gauss-2"), np.linspace(0.0, 1.0, n + 1))
         equations = CollocatedStates(mesh, np.full(k, free))
@@ -77,11 +65,7 @@ def test_the_adjoint_has_the_slopes_of_differences(k, free):
     mask[:1] = free and k != 2  # one told, the other free
     image = -np.eye(k) if k == 3 else None
     equations, (rates, on_states) = CollocatedStates(mesh, mask, image), spring(k)
-    weight, more, start = (
-        rng.normal(size=(k, mesh.n_point)),
-        rng.normal(size=(k, mesh.n_point)),
-        np.full(k, 0.2),
-    )
+    (weight, more), start = rng.normal(size=(2, k, mesh.n_point)), np.full(k, 0.2)
     moved = np.where(mask, 0.0, rng.normal(size=k))
 
     def number(size):
@@ -105,12 +89,10 @@ def test_half_a_period_and_its_image_are_the_whole():
     half, whole = (
         Mesh(scheme("gauss-4"), np.linspace(0.0, end, n + 1)) for end, n in ((0.5, 20), (1.0, 40))
     )
-    first, start, held = CollocatedStates(half, np.full(2, True), image).solve(
-        on_mesh(half, ode), np.zeros(2)
-    )
-    both, again, _ = CollocatedStates(whole, np.full(2, True)).solve(
-        on_mesh(whole, ode), np.zeros(2)
-    )
+    equations = CollocatedStates(half, np.full(2, True), image)
+    first, start, held = equations.solve(on_mesh(half, ode), np.zeros(2))
+    equations = CollocatedStates(whole, np.full(2, True))
+    both, again, _ = equations.solve(on_mesh(whole, ode), np.zeros(2))
     assert held
     np.testing.assert_allclose(start, again, atol=1e-11)
     np.testing.assert_allclose(np.concatenate([first, -first], axis=1), both, atol=1e-11)

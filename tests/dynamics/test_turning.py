@@ -1,5 +1,4 @@
-"""The distance of a gait that is asked to turn is the chord of an arc: what that means, and that
-every way to it agrees."""
+"""The distance of a gait that is asked to turn is the chord of an arc, by every way to it."""
 
 import numpy as np
 import pytest
@@ -35,10 +34,8 @@ def on_a_dense_grid(path, n=4000):
     t = np.arange(n) / n
     angles, rates = path(t)
     solved = BODY.solve(FRICTION, angles, rates, DELTA)
-    omega, centre = (
-        solved.z[2],
-        np.array([1, 1j]) @ np.array(BODY.motion(FRICTION, angles, rates, DELTA, solved).centre),
-    )
+    moved = BODY.motion(FRICTION, angles, rates, DELTA, solved)
+    omega, centre = solved.z[2], np.array([1, 1j]) @ np.array(moved.centre)
 
     def integral(rate):
         """From 0 up to every t and 1, by the spectrum; the mean grows."""
@@ -63,10 +60,8 @@ def test_a_period_turns_about_a_point_and_the_chord_is_that_of_the_mean_circle()
     assert abs(alpha) > 0.05
     # the point that a period leaves where it is: place(1) - c = e^(i alpha) (place(0) - c)
     centre = (place[-1] - np.exp(1j * alpha) * place[0]) / (1 - np.exp(1j * alpha))
-    evenly = (place - centre)[:-1] * np.exp(
-        -1j * alpha * np.arange(place.size - 1) / (place.size - 1)
-    )
-    radius = abs(evenly.mean())
+    t = np.linspace(0, 1, place.size)[:-1]
+    radius = abs(((place - centre)[:-1] * np.exp(-1j * alpha * t)).mean())
     assert np.ptp(abs(place - centre)) > 0.01 * radius  # it does wriggle
     found = replayed(turn=alpha)
     assert found.rotation == pytest.approx(alpha, abs=found.errors["rotation"])
@@ -106,15 +101,8 @@ CASES = cases(CASES, globals())
 
 
 def stated(case, turn, intervals=24):
-    given = {
-        "friction": FRICTION,
-        "guess": GAIT,
-        "intervals": intervals,
-        "delta": DELTA,
-        "delta_start": DELTA,
-        **CASES[case],
-    }
-    return Problem(case.replace(" ", "_"), rotation=turn, **given)
+    given = {"friction": FRICTION, "delta": DELTA, "delta_start": DELTA} | CASES[case]
+    return Problem(case.replace(" ", "_"), GAIT, rotation=turn, intervals=intervals, **given)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -140,16 +128,14 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
 
     gait = space.member(v)
     per_period = delta_per_period(problem.gait, gait, delta)
-    run, law = (inertial_replay, problem.law) if problem.froude else (replay, problem.law)
-    more = {"regime": problem.regime} if problem.froude else {}
-    fine = run(
-        BODY, law, gait, per_period, breaks=gait.corner_phases, tolerance=1e-6, turn=turn, **more
-    )
+    how = {"breaks": gait.corner_phases, "tolerance": 1e-6, "turn": turn}
+    how |= {"regime": problem.regime} if problem.froude else {}
+    run = inertial_replay if problem.froude else replay
+    fine = run(BODY, problem.law, gait, per_period, **how)
     control = control_problem(problem)
     error = mesh_error(control, control.in_phases(full.mesh, gait), gait, per_period, 1e-7)
-    assert values["distance"] / values["work"] / fine.efficiency - 1 == pytest.approx(
-        error.total, abs=3e-6
-    )
+    off = values["distance"] / values["work"] / fine.efficiency - 1
+    assert off == pytest.approx(error.total, abs=3e-6)
     assert abs(error.total) < error.estimate + 1e-7
 
 
@@ -160,8 +146,6 @@ def test_gradients_of_the_chord_are_those_of_differences(case):
     motion = ReducedProgram(space, DELTA).motion
     found = motion.gradients(v, DELTA)
     for name in ("distance", "rotation"):
-        both = [
-            [motion.values(v + sign * e, DELTA)[name] for sign in (1, -1)]
-            for e in h * np.eye(v.size)
-        ]
-        np.testing.assert_allclose(found[name], np.diff(both)[:, 0] / (-2 * h), atol=2e-6)
+        steps = h * np.eye(v.size)
+        high, low = ([motion.values(v + s * e, DELTA)[name] for e in steps] for s in (1, -1))
+        np.testing.assert_allclose(found[name], np.subtract(high, low) / (2 * h), atol=2e-6)

@@ -139,17 +139,3 @@ def test_a_table_that_cannot_be_used_is_refused_in_a_sentence(text, words, tmp_p
     path.write_text(text)
     with pytest.raises(ProblemError, match=words):
         fitted_friction(path)
-
-
-def test_arguments_that_cannot_be_are_refused_in_a_sentence(tmp_path):
-    with pytest.raises(ProblemError, match=r"cannot read .*nowhere.csv"):
-        fitted_friction(tmp_path / "nowhere.csv")
-    with pytest.raises(ProblemError, match="a row for each of at least 3 speeds"):
-        fitted_friction(np.ones((2, 3)))
-    for cell in (np.nan, "rough", None):
-        with pytest.raises(ProblemError, match=f"sample 2: along is {cell!r}"):
-            fitted_friction([[0.1, 0.5, 0.9], [0.2, cell, 0.9], [0.3, 0.5, 0.9]])
-    with pytest.raises(ProblemError, match="take both"):
-        fitted_friction(table(SPEED, SPEED), length=1.0)
-    with pytest.raises(ProblemError, match="length"):
-        fitted_friction(table(SPEED, SPEED), length=-1.0, period=2.0)

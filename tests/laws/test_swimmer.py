@@ -10,16 +10,13 @@ from scipy.integrate import solve_ivp
 from benchmarks.peers import drag
 from colloc.bounds.optimality_gap import gap_line
 from colloc.commands.solve import summary_lines
-from colloc.gaits.bspline import BSpline, Polygon
 from colloc.gaits.harmonic import Harmonic, ellipse
-from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import load_problem
-from colloc.laws.resistance import PowerLaw, Viscous
+from colloc.laws.resistance import Viscous
 from colloc.mechanics.chain import Chain
 from colloc.pictures.report_page import report_page
 from colloc.results.store import load, save
 from colloc.search.solve import solve
-from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -90,19 +87,6 @@ def test_the_path_decides_how_far_a_viscous_body_goes_and_the_pace_what_it_costs
     assert uneven.work > 1.1 * even.work
 
 
-def test_a_retraced_stroke_goes_nowhere():
-    measured = replay(
-        Chain(),
-        LAW,
-        lambda t: (
-            np.sin(2 * np.pi * t) * np.array([[1.0], [0.4]]),
-            2 * np.pi * np.cos(2 * np.pi * t) * np.array([[1.0], [0.4]]),
-        ),
-        1e-4,
-    )
-    assert measured.distance < 1e-14
-
-
 def test_purcells_swimmer_is_solved_certified_kept_and_read(tmp_path):
     solution = solve(load_problem(ROOT / "problems/purcell.py"), 1)
     assert solution.status == "solved"
@@ -127,14 +111,3 @@ def test_harmonics_settle_the_pace_and_more_of_them_come_closer_to_the_best_one_
         power = solution.power(solution.sample(np.arange(64) / 64))
         spread.append(power.std() / power.mean())
     assert spread[1] < 0.5 * spread[0]
-
-
-def test_classes_that_leave_the_pace_open_are_refused_where_it_matters():
-    for law in (LAW, PowerLaw(0.5)):
-        for gait in (BSpline(6, 1), Polygon(6)):
-            with pytest.raises(
-                ProblemError, match=r"work depends on the pace under .*; use Harmonic"
-            ):
-                Problem("paced", friction=law, gait=gait)
-    with pytest.raises(ProblemError, match="scallop theorem"):
-        Problem("scallop", body=Chain((0.5, 0.5)), friction=LAW, gait=Harmonic(2))

@@ -1,18 +1,20 @@
-"""Admissible shapes: smooth bounds against plain segment intersection."""
+"""Admissible shapes of lines and of strips: smooth bounds against plain segment intersection and
+against points of the links."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from colloc import Chain, Fourier, Harmonic, Problem, ProblemError, ellipse, solve
+from colloc.bounds.motions import admissible
 from colloc.dynamics.control_problem import control_problem
-from colloc.gaits.harmonic import Fourier
-from colloc.gaits.problem import Problem
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import (
     SMOOTHING,
     crossing_depth,
+    ends_and_links,
     far_pairs,
+    lacking_width,
     overlapping_pairs,
     passing_depth,
     share_of_first,
@@ -43,18 +45,6 @@ def test_bounds_never_allow_a_crossing_and_forbid_little_else(lengths):
     assert (crossing.mean() > 0.02) == (lengths[0] + lengths[2] > lengths[1])
 
 
-def test_equal_links_touch_where_the_known_lines_say():
-    body = Chain()
-    a = np.linspace(2 * np.pi / 3, np.pi, 20)
-    for b_edge in (2 * np.pi - 2 * a, (2 * np.pi - a) / 2):
-        b = np.clip(b_edge, 0, np.pi)
-        first, second = 2 * a + b, a + 2 * b
-        edge = np.isclose(np.minimum(first, second), 2 * np.pi)
-        inside, outside = np.stack([a, b - 1e-6])[:, edge], np.stack([a + 1e-6, b + 1e-6])[:, edge]
-        assert crossing_depth(body, inside).max(initial=0) < 1e-5
-        assert np.all(crossing_depth(body, outside)[np.abs(outside[0]) < np.pi] > 0)
-
-
 def test_the_gap_between_links_is_that_of_their_points():
     body = Chain((0.2, 0.35, 0.15, 0.3))
     rng = np.random.default_rng(3)
@@ -77,6 +67,12 @@ def test_the_gap_between_links_is_that_of_their_points():
     np.testing.assert_allclose(lacks[crossing], wide.width, rtol=1e-14)
     known = np.maximum(wide.width - naive, 0.0)
     assert np.abs(lacks - known)[~crossing].max() < 0.35 / 200
+    # what a search bounds, of every end and every link but its own
+    assert len(ends_and_links(wide)) == 4 * 3
+    for end, link in ends_and_links(wide):
+        lacking, w = lacking_width(wide, angles, end, link)[0], wide.width
+        naive = np.hypot(*(points[link] - ends[:, end, :, None])).min(axis=1)
+        np.testing.assert_allclose(np.sqrt(w**2 - 2 * w * lacking), naive, atol=0.35 / 200)
 
 
 def test_two_links_cannot_cross():
@@ -197,3 +193,52 @@ def test_a_body_in_a_mirror_meets_itself_on_the_other_side_as_deep(lengths):
     assert crossed[deep > 1e-9].all()
     assert deep[~crossed].max() == 0.0
     assert 0.05 < crossed.mean() < 0.95
+
+
+@pytest.mark.parametrize("width", [0.01, 0.03, 0.2])
+def test_a_joint_folds_until_the_free_end_lies_beside_its_neighbour(width):
+    body, last = Chain(width=width), np.pi - np.arcsin(3 * width)
+    folded = np.array([[last - 1e-6, last + 1e-6], [0.0, 0.0]])
+    for shapes in (folded, -folded, folded[::-1]):
+        assert np.array_equal(admissible(body, shapes), [True, False])
+        assert np.array_equal(crossing_depth(body, shapes) > 0, [False, True])
+    # of unequal neighbours the shorter decides
+    uneven = Chain((0.5, 0.3, 0.2), width=width * 0.9)
+    last = np.pi - np.arcsin(uneven.width / 0.3)
+    beside = np.array([[last - 1e-6, last + 1e-6], [0.0, 0.0]])
+    assert np.array_equal(crossing_depth(uneven, beside) > 0, [False, True])
+
+
+def test_without_a_width_nothing_is_different():
+    assert Problem("lines", body=Chain(width=0.0)).hash == Problem("lines").hash
+    assert "width" not in Problem("lines").to_dict()["body"]
+    assert len(Chain().contacts()) == 2
+    wide = Problem("strips", body=Chain(width=0.02))
+    assert wide.hash != Problem("strips").hash
+    assert Problem.from_dict(wide.to_dict()).body == Chain(width=0.02)
+
+
+@pytest.mark.parametrize("width", [-0.01, 1 / 3, np.nan, np.inf, True, "thick", None])
+def test_a_width_is_less_than_the_shortest_link(width):
+    with pytest.raises(ProblemError, match="width"):
+        Chain(width=width)
+
+
+def test_a_guess_that_overlaps_is_refused():
+    guess = ellipse(A0=2.4, A1=0.3, B1=0.5)
+    with pytest.raises(ProblemError, match="links overlap"):
+        Problem("thick", guess, Chain(width=0.12), gait=Harmonic(1, "bilateral"))
+
+
+def test_the_best_folded_gait_keeps_its_width_and_pays_for_it():
+    guess, width = ellipse(A0=2.4, A1=0.3, B1=0.5), 0.03
+    at = {"gait": Harmonic(1, "bilateral"), "delta_start": 1e-3, "intervals": 12}
+    problem = Problem("folded", guess, Chain(width=width), **at)
+    wide = solve(problem, 1)
+    assert wide.status == "solved"
+    # as lines the links lie on each other, at 0.1030 (problems/three_link_folded.py)
+    assert 0.09 < wide.certificate.efficiency < 0.098
+    angles = wide.gait.angles(np.linspace(0.0, 1.0, 4001))
+    assert np.max(np.abs(angles)) < np.pi - np.arcsin(width * 3) + 1e-6
+    wider = Chain(width=width + 1e-4)
+    assert crossing_depth(wider, angles).max() == pytest.approx(1e-4, abs=1e-6)

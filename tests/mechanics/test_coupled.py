@@ -20,8 +20,8 @@ def stated(body, gait, **changes):
     return Problem("c", body=body, friction=LAW, gait=gait, delta=1e-3, **changes)
 
 
-def solved(body, gait, **changes):
-    return colloc.solve(stated(body, gait, **changes), starts=2)
+def solved(body, gait, starts=2, **changes):
+    return colloc.solve(stated(body, gait, **changes), starts=starts)
 
 
 @pytest.fixture(scope="module")
@@ -87,11 +87,11 @@ def test_symmetries_that_gears_or_stuck_joints_break_are_refused():
 
 
 def test_limits_are_those_of_the_joints_that_move():
-    narrow = solved(FIVE, BELTS, joint_limit=0.5)
-    joints = narrow.gait.angles(np.linspace(0, 1, 2001))
-    assert narrow.status == "solved"
-    assert np.abs(joints).max() == pytest.approx(0.5, abs=1e-6)
-    assert solved(FOUR, BROKEN, joint_limit=0.6).status == "solved"
+    for body, gait, limit in ((FIVE, BELTS, 0.5), (FOUR, BROKEN, 0.6)):
+        narrow = solved(body, gait, joint_limit=limit, starts=1)
+        assert narrow.status == "solved"
+        joints = narrow.gait.angles(np.linspace(0, 1, 2001))
+        assert np.abs(joints).max() == pytest.approx(limit, abs=1e-6)
 
 
 def test_torque_and_power_are_those_of_the_motors(broken):
@@ -132,39 +132,3 @@ def test_it_is_kept_in_files(tmp_path, broken):
     read = colloc.load(colloc.save(broken, tmp_path / "b.h5"))
     assert (read.problem.gait, read.problem.hash) == (BROKEN, broken.problem.hash)
     np.testing.assert_array_equal(read.gait.angles(t), broken.gait.angles(t))
-
-
-@pytest.mark.parametrize(
-    ("said", "words"),
-    [
-        ({"stuck": {5: 0.1}}, "joint 5: the chain has joints 0 to 2"),
-        ({"stuck": {0: 4.0}}, "between -pi and pi"),
-        ({"stuck": {0: 0.0, 1: 0.0, 2: 0.0}}, "all joints are stuck"),
-        ({"stuck": {0: 3.0, 1: 3.0}, "gears": ((0,), (0,), (1,))}, "links cross"),
-        ({"gears": ((1, 0), (0, 1))}, "2 rows, and the chain has 3 joints"),
-        ({"gears": ((1, 0), (0, 1), (0, 0))}, "joint 2 .* hangs on no motor"),
-        ({"gears": ((1, 0), (0, 1), (1, 1)), "stuck": {2: 0.0}}, "is stuck, and hangs on a motor"),
-        ({"gears": ((1, 1), (1, 1), (1, 1))}, "two motors do the same"),
-        ({"gears": "belts"}, "a row of numbers for each joint"),
-        ({"gears": 3}, "a row of numbers for each joint"),
-        ({"stuck": 5}, "stuck gives joints and their angles"),
-        ({"stuck": [1, 2]}, "stuck gives joints and their angles"),
-        ({"stuck": [(1, 0.1), (1, 0.2)]}, "each is named once"),
-    ],
-)
-def test_what_cannot_be_is_refused_in_a_sentence(said, words):
-    with pytest.raises(ProblemError, match=words):
-        stated(FOUR, Coupled(Harmonic(1), **said))
-
-
-def test_other_bodies_slopes_and_inertia_are_refused_in_a_sentence():
-    with pytest.raises(ProblemError, match=r"gait=Coupled\(Harmonic\(1\), stuck="):
-        Coupled(FOUR, stuck={1: 0.4})
-    with pytest.raises(ProblemError, match="joints of a Chain"):
-        stated(colloc.ModalBody(3), Coupled(Harmonic(1)))
-    with pytest.raises(ProblemError, match="joints all have motors"):
-        stated(FOUR, BROKEN, froude=0.05)
-    with pytest.raises(ProblemError, match="slope"):
-        stated(FOUR, BROKEN, grade=0.05)
-    with pytest.raises(ProblemError, match=r"on 1 motor.* goes anywhere"):
-        Problem("scallop", body=FIVE, gait=Coupled(Harmonic(1), gears=((1,),) * 4))

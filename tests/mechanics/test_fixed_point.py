@@ -1,30 +1,24 @@
-"""The balance solver: its methods, what it refuses, and starts and folds that are hard; its
-invariances are in tests/hard/test_properties.py."""
+"""The balance solver: its methods, starts and folds that are hard, and outside forces at the centre
+of mass; its invariances are in tests/hard/test_properties.py."""
 
 import numpy as np
 import pytest
+from shared.instants import random_instants, random_loads
 
 from benchmarks.zoo import feet_problem
+from colloc import Chain, Friction, NotConvergedError, ProblemError, solve_balance
 from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
-from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.mechanics.solution_branches import all_balanced_velocities
 
-ISOTROPIC = Friction()
-
-
-def random_instants(seed, count, n_joint=2):
-    rng = np.random.default_rng(seed)
-    rates = rng.normal(size=(n_joint, count))
-    rates[0, ::10] = 0.0
-    return rng.uniform(-np.pi, np.pi, (n_joint, count)), rates
+LOPSIDED = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
+UNEQUAL = Friction(mu_t=1.7, mu_f=1, mu_b=1.3)
 
 
 @pytest.mark.parametrize("delta", [1e-1, 1e-4])
 def test_fixed_point_and_newton_agree(delta):
-    angles, rates = random_instants(13, 200)
-    at = Chain(), ISOTROPIC, angles, rates, delta
+    angles, rates = random_instants(200, seed=13)
+    rates[0, ::10] = 0.0
+    at = Chain(), Friction(), angles, rates, delta
     newton = solve_balance(*at, tolerance=1e-13)
     fixed = solve_balance(*at, tolerance=1e-13, method="fixed_point", max_iterations=5000)
     assert newton.converged.all()
@@ -48,43 +42,13 @@ def test_a_start_next_to_the_answer_does_not_lose_it():
     assert np.abs(start - from_rest.z).max() < 1e-3
 
 
-def test_reversing_the_rates_reverses_the_solution_where_friction_is_reversible_and_only_there():
-    angles, rates = random_instants(17, 60)
-    for friction, reverses in (
-        (Friction(mu_t=3, mu_f=1, mu_b=1), True),
-        (Friction(mu_t=1, mu_f=1, mu_b=3), False),
-    ):
-        there, back = (solve_balance(Chain(), friction, angles, k * rates, 1e-3).z for k in (1, -1))
-        assert np.allclose(there, -back, atol=1e-9) == reverses
-
-
 def test_what_does_not_converge_is_reported_and_required_loudly():
-    angles, rates = random_instants(23, 50)
-    solved = solve_balance(
-        Chain(), ISOTROPIC, angles, rates, 1e-6, max_iterations=2, method="newton"
-    )
+    at = Chain(), Friction(), *random_instants(50), 1e-6
+    solved = solve_balance(*at, max_iterations=2, method="newton")
     assert not solved.converged.all()
     assert np.array_equal(solved.converged, solved.residual <= 1e-11)
     with pytest.raises(NotConvergedError, match="of 50 instants"):
         solved.require()
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"delta": 0.0}, "delta"),
-        ({"delta": -1e-4}, "delta"),
-        ({"delta": float("nan")}, "delta"),
-        ({"angles": np.zeros((3, 4))}, "shape"),
-        ({"rates": np.full((2, 4), np.nan)}, "finite"),
-        ({"start": np.zeros((2, 4))}, "start"),
-        ({"method": "magic"}, "method"),
-    ],
-)
-def test_unusable_input_is_refused(change, message):
-    arguments = {"angles": np.zeros((2, 4)), "rates": np.ones((2, 4)), "delta": 1e-4, **change}
-    with pytest.raises(ProblemError, match=message):
-        solve_balance(Chain(), ISOTROPIC, **arguments)
 
 
 BESIDE_A_FOLD = [
@@ -128,3 +92,63 @@ def test_beside_a_fold_of_the_balance_the_other_solution_is_found_in_few_steps(c
     assert np.abs(net_force(now.posture, now.force)).max() < 1e-9
     # forty with each link as the anchor
     assert max(first.iterations.max(), found.iterations.max()) <= 40 * body.n_link
+
+
+def test_no_load_is_a_load_of_nothing():
+    at = LOPSIDED, UNEQUAL, *random_instants(50), 1e-4
+    plain, loaded = (solve_balance(*at, load=load).z for load in (None, np.zeros((2, 50))))
+    np.testing.assert_array_equal(plain, loaded)
+
+
+def test_a_body_whose_joints_rest_creeps_as_friction_on_a_point_says():
+    """Then all points move alike: mu v/sqrt(v^2 + delta^2) is the load, whatever the shape."""
+    angles, delta = random_instants(8)[0], 1e-4
+    for size in (1e-6, 0.5, 1 - 1e-6):
+        load = random_loads(8, size)
+        for rates in (np.zeros_like(angles), np.full_like(angles, 1e-30)):
+            z = solve_balance(
+                LOPSIDED, Friction(), angles, rates, delta, load=load, tolerance=1e-14
+            ).z
+            creep = delta * size / np.sqrt((1 - size) * (1 + size))
+            np.testing.assert_allclose(z[:2], creep * load / size, rtol=0, atol=1e-6 * creep)
+            np.testing.assert_allclose(z[2], 0.0, atol=1e-6 * creep)
+
+
+@pytest.mark.parametrize("law", [Friction(), UNEQUAL], ids=str)
+def test_a_load_beyond_friction_is_not_balanced(law):
+    at, load = (LOPSIDED, law, *random_instants(6), 1e-3), random_loads(6, 1.01 * law.largest)
+    assert not solve_balance(*at, load=load, max_iterations=50).converged.any()
+
+
+def test_all_motions_under_a_load_are_balanced_and_counted_by_their_signs():
+    law = Friction(mu_t=1, mu_f=0.01, mu_b=100)  # as in the printed example of several motions
+    angles, rates = (np.tile(a, 9) for a in ([[0.78302927], [1.74481885]], [[-3.0], [0.0]]))
+    load = np.vstack([np.linspace(-0.004, 0.004, 9), np.full(9, 1e-4)])
+    found = all_balanced_velocities(Chain(), law, angles, rates, 1e-4, load)
+    assert found.number.max() == 3
+    assert found.complete.all()
+    for z, sign in zip(found.z, found.sign, strict=True):
+        at = np.flatnonzero(sign)
+        stays = solve_balance(
+            Chain(), law, angles[:, at], rates[:, at], 1e-4, load=load[:, at], start=z[:, at]
+        )
+        np.testing.assert_allclose(stays.z, z[:, at], atol=1e-6)
+
+
+def test_a_body_with_shape_coordinates_of_its_own_is_not_taken_for_its_joints():
+    """The kernel would read joint angles that nobody gave."""
+
+    class Belt(Chain):
+        n_joint = 1
+
+    with pytest.raises(ProblemError, match="not its 2 joints"):
+        solve_balance(Belt(), Friction(), *random_instants(5, n_joint=1), 1e-3)
+
+
+def test_a_load_in_whole_numbers_counts_as_they_do():
+    angles, rates = np.array([[0.5], [0.2]]), np.array([[1.0], [0.0]])
+    at = Chain(), Friction(), angles, rates, 1e-3
+    load = np.array([[0], [1]])
+    solved = solve_balance(*at, load=0.3 * load)
+    whole, real = (at[0].motion(*at[1:], solved, load=each) for each in (load, 1.0 * load))
+    assert whole.actuator_power == real.actuator_power

@@ -32,16 +32,10 @@ def fresh(monkeypatch):
     library.cache_clear()
 
 
-def fields(solution):
-    return np.vstack(
-        [
-            solution.z,
-            solution.residual,
-            solution.iterations,
-            solution.anchor,
-            solution.anchor_velocity,
-        ]
-    )
+def fields(law, angles, rates):
+    found = solve_balance(Chain(), law, angles, rates, 1e-5)
+    parts = found.z, found.residual, found.iterations, found.anchor, found.anchor_velocity
+    return np.vstack(parts)
 
 
 @needs_kernel
@@ -49,29 +43,21 @@ def fields(solution):
 def test_an_instant_has_the_same_bits_on_repetition_on_threads_and_in_any_batch(monkeypatch, law):
     angles, rates = random_instants(N_TIME)
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    once = fields(solve_balance(Chain(), law, angles, rates, 1e-5))
-    np.testing.assert_array_equal(fields(solve_balance(Chain(), law, angles, rates, 1e-5)), once)
+    once = fields(law, angles, rates)
+    np.testing.assert_array_equal(fields(law, angles, rates), once)
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
-    np.testing.assert_array_equal(fields(solve_balance(Chain(), law, angles, rates, 1e-5)), once)
+    np.testing.assert_array_equal(fields(law, angles, rates), once)
     few = slice(4321, 4371)
-    np.testing.assert_array_equal(
-        fields(solve_balance(Chain(), law, angles[:, few], rates[:, few], 1e-5)), once[:, few]
-    )
+    np.testing.assert_array_equal(fields(law, angles[:, few], rates[:, few]), once[:, few])
 
 
 @needs_kernel
 def test_views_with_any_strides_are_read_right():
     angles, rates = random_instants(40)
     whole = solve_balance(Chain(), Friction(), angles, rates, 1e-3)
-    backwards = solve_balance(
-        Chain(),
-        Friction(),
-        angles[:, ::-1],
-        np.asfortranarray(rates[:, ::-1]),
-        1e-3,
-        start=whole.z[:, ::-1],
-    )
-    np.testing.assert_allclose(backwards.z[:, ::-1], whole.z, rtol=0, atol=1e-9)
+    there = angles[:, ::-1], np.asfortranarray(rates[:, ::-1])
+    back = solve_balance(Chain(), Friction(), *there, 1e-3, start=whole.z[:, ::-1])
+    np.testing.assert_allclose(back.z[:, ::-1], whole.z, rtol=0, atol=1e-9)
 
 
 def test_threads_are_those_asked_for(monkeypatch):
@@ -99,7 +85,8 @@ def test_a_clone_that_was_not_built_uses_the_kernel_that_was_installed(fresh):
 
 
 def test_without_a_kernel_of_its_own_sources_numpy_gives_the_answer(fresh, tmp_path):
-    known = solve_balance(Chain(), Friction(), *random_instants(5), 1e-3).z
+    at = Chain(), Friction(), *random_instants(5), 1e-3
+    known = solve_balance(*at).z
     changed = tmp_path / "native"
     shutil.copytree(native_kernel_module.SOURCES, changed)
     (changed / "parts.h").write_text((changed / "parts.h").read_text() + "/* changed */")
@@ -108,9 +95,7 @@ def test_without_a_kernel_of_its_own_sources_numpy_gives_the_answer(fresh, tmp_p
     with pytest.warns(SlowWarning, match="by NumPy.*not built, or its sources changed since"):
         assert native_kernel() is None
     assert native_kernel() is None  # said once
-    np.testing.assert_allclose(
-        solve_balance(Chain(), Friction(), *random_instants(5), 1e-3).z, known, rtol=0, atol=1e-9
-    )
+    np.testing.assert_allclose(solve_balance(*at).z, known, rtol=0, atol=1e-9)
 
 
 def test_solving_a_balance_loads_neither_casadi_nor_matplotlib():

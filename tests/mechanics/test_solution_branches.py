@@ -1,22 +1,18 @@
 """All balanced velocities at an instant: one for equal coefficients, several for some instants of
 others."""
 
-import mpmath as mp
 import numpy as np
 import pytest
 
-from benchmarks.reference import balanced_velocity
-from colloc.gaits.harmonic import ellipse
+from colloc import Chain, Friction, ellipse, solve_balance
 from colloc.mechanics import solution_branches
 from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import numpy_instead
 from colloc.mechanics.solution_branches import DISTINCT, all_balanced_velocities
 from tests.shared.laws import coulomb
 
 PRINTED = (np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]]))
+STEEP = Friction(mu_t=1, mu_f=0.01, mu_b=100)
 
 
 def random_instants(seed, count, n_joint=2):
@@ -26,7 +22,7 @@ def random_instants(seed, count, n_joint=2):
 
 
 def test_the_printed_instant_has_three_motions_and_the_middle_one_is_unstable():
-    found = all_balanced_velocities(Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), *PRINTED, 1e-4)
+    found = all_balanced_velocities(Chain(), STEEP, *PRINTED, 1e-4)
     assert found.number == [3]
     spin = found.z[:, 2, 0]
     order = np.argsort(spin)
@@ -39,28 +35,11 @@ def test_the_printed_instant_has_three_motions_and_the_middle_one_is_unstable():
 def test_motions_scale_with_the_unit_of_time(unit):
     """Friction knows no speed but delta: the same motions, as many and in the same order."""
     angles, rates = random_instants(4, 60)
-    at = (np.concatenate([angles, PRINTED[0]], axis=1), np.concatenate([rates, PRINTED[1]], axis=1))
-    law = Friction(mu_t=1, mu_f=0.01, mu_b=100)
-    slow = all_balanced_velocities(Chain(), law, *at, 1e-4)
-    fast = all_balanced_velocities(Chain(), law, at[0], unit * at[1], unit * 1e-4)
+    angles, rates = np.hstack([angles, PRINTED[0]]), np.hstack([rates, PRINTED[1]])
+    slow = all_balanced_velocities(Chain(), STEEP, angles, rates, 1e-4)
+    fast = all_balanced_velocities(Chain(), STEEP, angles, unit * rates, unit * 1e-4)
     np.testing.assert_array_equal(fast.sign, slow.sign)
     np.testing.assert_allclose(fast.z, unit * slow.z, rtol=1e-6, atol=1e-8 * unit)
-
-
-def test_each_of_them_is_a_root_of_the_reference_in_forty_digits():
-    body, coefficients = Chain(), (1, 0.01, 100)
-    found = all_balanced_velocities(body, coulomb(*coefficients), *PRINTED, 1e-4)
-    posture = body.posture(PRINTED[0], 1)
-    for z in found.z[:, :, 0]:
-        # the velocity of the middle link's midpoint, and back
-        link = body.velocity(body.posture(PRINTED[0]), PRINTED[1], z[:, None])
-        vs, vn, w = (float(part[1, 0]) for part in link)
-        c, s = (float(part[1, 0]) for part in posture[:2])
-        start = (vs * c - vn * s, vs * s + vn * c, w)
-        root = balanced_velocity(
-            body.lengths, coefficients, PRINTED[0][:, 0], PRINTED[1][:, 0], 1e-4, 1, start
-        )
-        assert max(abs(mp.mpf(a) - b) for a, b in zip(start, root, strict=True)) < 1e-8
 
 
 @pytest.mark.parametrize("n_joint", [2, 3])
@@ -111,14 +90,9 @@ def test_links_at_rest_find_at_least_what_hundreds_of_random_starts_find():
 
 
 def test_numpy_finds_the_same_as_the_compiled_solver():
-    angles, rates = (np.tile(a, 2) for a in PRINTED)
-    compiled = all_balanced_velocities(
-        Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4
-    )
+    compiled = all_balanced_velocities(Chain(), STEEP, *PRINTED, 1e-4)
     with numpy_instead():
-        found = all_balanced_velocities(
-            Chain(), Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4
-        )
+        found = all_balanced_velocities(Chain(), STEEP, *PRINTED, 1e-4)
     np.testing.assert_allclose(np.sort(found.z, axis=0), np.sort(compiled.z, axis=0), atol=1e-7)
 
 

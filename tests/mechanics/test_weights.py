@@ -1,30 +1,28 @@
-"""Links of different weights: friction follows the weight, and so does the centre of mass."""
+"""Links of different weights and masses: friction follows the weight, inertia and the centre of mass
+follow the mass."""
 
 import numpy as np
 import pytest
 from shared.instants import random_instants
 
-from benchmarks.independent_replay import Crawler, played
 from colloc import (
     Chain,
-    Elliptic,
     Friction,
+    Harmonic,
     Problem,
     ProblemError,
-    load,
-    replay,
-    save,
+    ellipse,
+    evaluate,
     solve_balance,
 )
 from colloc.bounds.motions import Domain
 from colloc.bounds.sampled import Budget, efficiency_bound
-from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.search.solve import solve
+from colloc.mechanics.inertia import kinetic_energy
 from research.guarantee.guaranteed import certify
 from tests.shared.laws import coulomb
 
 LENGTHS, WEIGHTS = (0.2, 0.5, 0.3), (0.5, 0.2, 0.3)
-LAWS = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), Elliptic(mu_t=2, mu_f=1, mu_b=1.5)]
+MASSES, INERTIAS = (0.6, 0.3, 0.1), (0.004, 0.006, 0.0009)
 
 
 def test_weights_in_proportion_to_the_lengths_are_no_weights_to_the_last_bit():
@@ -68,31 +66,6 @@ def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_them
     assert (np.abs(body.forces(law, angles, rates, z, 1e-9)) <= most[:, None] * (1 + 1e-12)).all()
 
 
-def test_the_replay_is_that_of_a_program_of_its_own():
-    gait = Fourier([0.2, -0.1], [[1.2], [0.3]], [[0.2], [1.0]])
-    crawler = Crawler(LENGTHS, (1.7, 1.0, 1.3), WEIGHTS)
-    theirs = played(crawler, lambda t: (gait.angles(t), gait.rates(t)), 1e-2, 1e-5)
-    ours = replay(Chain(LENGTHS, weights=WEIGHTS), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), gait, 1e-2)
-    assert ours.work == pytest.approx(theirs.work, rel=1e-4)
-    assert ours.distance == pytest.approx(theirs.distance, rel=1e-4)
-    assert ours.rotation == pytest.approx(theirs.rotation, rel=1e-4)
-
-
-def test_a_problem_with_weights_is_solved_certified_and_kept(tmp_path):
-    problem = Problem(
-        "heavy_ends", body=Chain(weights=(0.4, 0.2, 0.4)), gait=Harmonic(1, "bilateral")
-    )
-    found = solve(problem, 1)
-    assert found.status == "solved"
-    assert found.answer.program == "full"
-    again = load(save(found, tmp_path / "heavy.h5"))
-    assert again.problem.body == problem.body
-    assert again.problem.hash == problem.hash
-    assert "weights" not in Problem("plain").to_dict()["body"]
-    # the bound 1/min(mu) holds for the centre of mass that the weights have
-    assert found.efficiency < 1.0
-
-
 def test_a_bound_knows_the_weights_or_refuses():
     heavy = Chain(weights=(0.4, 0.2, 0.4))
     budget = Budget(intervals=4, shapes=6, directions=12, rounds=2)
@@ -101,9 +74,6 @@ def test_a_bound_knows_the_weights_or_refuses():
     numbers = np.array(other.coefficients)
     with pytest.raises(ProblemError, match="weights"):
         certify(Domain(heavy, Friction(), np.pi), other.potential_space(heavy), numbers, 0.6)
-
-
-MASSES = (0.1, 0.3, 0.6)
 
 
 def test_masses_that_are_the_weights_are_no_masses():
@@ -116,7 +86,7 @@ def test_masses_that_are_the_weights_are_no_masses():
 
 
 def test_a_body_with_masses_says_so_and_how_it_leans():
-    body = Chain(masses=MASSES, inertias=(0.01, 0.0, 0.01))
+    body = Chain(masses=(0.1, 0.3, 0.6), inertias=(0.01, 0.0, 0.01))
     text = body.describe()
     assert not Chain(weights=(0.4, 0.4, 0.2)).symmetric
     assert not Chain(inertias=(0.01, 0.01, 0.02)).symmetric
@@ -129,20 +99,42 @@ def test_a_body_with_masses_says_so_and_how_it_leans():
     assert body.imbalance(np.zeros((2, 1)))[0] == pytest.approx(0.5 / 3, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("fields", "said"),
-    [
-        *(({"lengths": (0.3, 0.3, 0.4 + off)}, "must add up to") for off in (1e-3, -1e-3, 1e-10)),
-        *(({"weights": (0.5, 0.5, odd)}, r"body\.weights") for odd in (0.5, 0.0, "x", np.nan)),
-        ({"weights": (1.0,)}, "one for each of the 3 links"),
-        ({"weights": 3.0}, "sequence of numbers"),
-        ({"masses": (0.5, 0.5)}, "one for each of the 3 links"),
-        ({"masses": (0.5, 0.5, 0.5)}, "the body's mass 1"),
-        ({"inertias": (0.1, -0.1, 0.1)}, "not negative"),
-        ({"inertias": (0.1, 0.1)}, "one for each of the 3 links"),
-    ],
-)
-def test_parts_that_cannot_be_are_refused_in_a_sentence(fields, said):
-    with pytest.raises(ProblemError, match=said):
-        Chain(**fields)
-    assert Chain((0.1,) * 10).n_link == 10  # whose sum is 1 less a rounding
+def energy(angles, rates, z, masses=MASSES, inertias=INERTIAS):
+    """Kinetic energy of rigid links at one instant, by complex numbers."""
+    phi, spin = np.cumsum([0.0, *angles]), z[2] + np.cumsum([0.0, *rates])
+    links = np.array(LENGTHS) * np.exp(1j * phi)
+    starts = z[0] + 1j * z[1] + np.concatenate([[0.0], np.cumsum(1j * spin * links)[:-1]])
+    speed = np.abs(starts + 0.5j * spin * links)
+    return 0.5 * (masses @ speed**2 + inertias @ spin**2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_kinetic_energy_weighs_every_link_by_its_mass(seed):
+    rng = np.random.default_rng(seed)
+    angles, rates, z = rng.normal(size=2), rng.normal(size=2), rng.normal(size=3)
+    at = [each[:, None] for each in (angles, rates, z)]
+    found = kinetic_energy(Chain(LENGTHS, masses=MASSES, inertias=INERTIAS), *at).item()
+    assert found == pytest.approx(energy(angles, rates, z, MASSES, INERTIAS), rel=1e-12)
+    # unsaid, they are rods of equal density
+    lengths, found = np.array(LENGTHS), kinetic_energy(Chain(LENGTHS), *at).item()
+    assert found == pytest.approx(energy(angles, rates, z, lengths, lengths**3 / 12), rel=1e-12)
+
+
+def test_what_joints_do_beyond_friction_is_the_growth_of_kinetic_energy():
+    """From the start of a period to any phase of it: work of the joints = work against friction +
+    Fr times what E grows by."""
+    froude, body = 0.3, Chain(LENGTHS, masses=MASSES, inertias=INERTIAS)
+    at = {"friction": Friction(mu_t=2), "gait": Harmonic(1), "froude": froude, "delta": 1e-2}
+    problem = Problem("heavy_tail", body=body, **at)
+    solution = evaluate(problem.with_(mesh_tolerance=1e-4), ellipse(0.2, 0.9, 0.8))
+    robot = solution.robot(length=1.0, mass=1.0, period=(1 / (9.81 * froude)) ** 0.5)
+    t = np.linspace(0, 1, 2001)
+    motion = solution.sample(t)
+    spent = (robot.torques(t) / robot.torque_unit * motion.rates).sum(axis=0)
+    beyond = spent - solution.power(motion)
+    gained = np.concatenate([[0.0], np.cumsum(0.5 * (beyond[1:] + beyond[:-1]) * np.diff(t))])
+    instants = zip(motion.angles.T, motion.rates.T, motion.z.T, strict=True)
+    growth = froude * np.array([energy(*instant) for instant in instants])
+    growth -= growth[0]
+    assert np.ptp(growth) > 0.03 * solution.work
+    np.testing.assert_allclose(gained, growth, rtol=0, atol=1e-2 * np.ptp(growth))

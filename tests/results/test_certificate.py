@@ -1,5 +1,4 @@
-"""Every check of the certificate refuses what lies just above its limit, and nothing else does; the
-limits are these."""
+"""Every check of the certificate refuses what lies just above its limit, and nothing else does."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -7,21 +6,25 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from colloc import (
+    Chain,
+    Fourier,
+    Friction,
+    Harmonic,
+    Problem,
+    Solution,
+    ellipse,
+    replay,
+    save,
+    slope_motion,
+)
 from colloc.commands.results import verify as recheck
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.objective import QUANTITIES
-from colloc.gaits.problem import Problem
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
 from colloc.results.answer import SecondOrder
 from colloc.results.measured import extrapolated_limit
-from colloc.results.solution import Solution
-from colloc.results.store import save
 from colloc.search import certify as verify
 from colloc.search.certify import certify, gait_certificate
 from colloc.verification import replay as replay_module
-from colloc.verification.differential_motion import slope_motion
-from colloc.verification.replay import replay
 
 JUST_BELOW, JUST_ABOVE = 0.95, 1.05
 
@@ -116,10 +119,11 @@ def test_what_the_replay_measures(failures, name, changes):
 @pytest.mark.parametrize("sign", [1, -1])
 def test_collocated_against_replayed_efficiency(failures, three_link, replays, sign):
     true = replays[max(replays)].efficiency
-    judged(
-        "replay gap",
-        lambda f: failures(with_answer(three_link, value=true * (1 + sign * f * 1e-4))),
-    )
+
+    def run(f):
+        return failures(with_answer(three_link, value=true * (1 + sign * f * 1e-4)))
+
+    judged("replay gap", run)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -143,11 +147,8 @@ def test_joint_limits_are_those_of_the_problem(failures, three_link):
     largest = np.abs(three_link.gait.angles(np.linspace(0, 1, 20001))).max()
 
     def run(f):
-        return failures(
-            with_answer(
-                three_link, problem=three_link.problem.with_(joint_limit=largest - f * 1e-6)
-            )
-        )
+        tight = three_link.problem.with_(joint_limit=largest - f * 1e-6)
+        return failures(with_answer(three_link, problem=tight))
 
     judged("joint limits", run)
 
@@ -195,11 +196,8 @@ def test_self_contact(failures, monkeypatch, depth):
 
 def test_mesh_error(failures, three_link, monkeypatch):
     def run(f):
-        monkeypatch.setattr(
-            verify,
-            "mesh_error",
-            lambda *a: SimpleNamespace(estimate=f * three_link.problem.mesh_tolerance),
-        )
+        found = SimpleNamespace(estimate=f * three_link.problem.mesh_tolerance)
+        monkeypatch.setattr(verify, "mesh_error", lambda *a: found)
         return failures()
 
     judged("mesh error", run)
@@ -209,13 +207,11 @@ def test_mesh_error(failures, three_link, monkeypatch):
 def test_influence_of_delta(failures, replays, sign):
     largest = replays[max(replays)].efficiency
 
-    def run(f):
+    def smaller_deltas(f):
         limit = largest * (1 + sign * f * 1e-2)
-        return failures(
-            change=lambda part, r: r if part == 1 else changed(r, distance=limit * r.work)
-        )
+        return lambda part, r: r if part == 1 else changed(r, distance=limit * r.work)
 
-    judged("delta influence", run)
+    judged("delta influence", lambda f: failures(change=smaller_deltas(f)))
 
 
 def test_the_replay_is_as_accurate_as_was_asked_for(three_link, tmp_path, capsys):
@@ -226,44 +222,31 @@ def test_the_replay_is_as_accurate_as_was_asked_for(three_link, tmp_path, capsys
     assert "NOT CERTIFIED" in capsys.readouterr().out
 
 
-SLOW = pytest.mark.slow
+LONG = [pytest.param(name, marks=pytest.mark.slow) for name in ("four_link", "five_link")]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "two_link",
-        "three_link",
-        "small_gaits",
-        *(pytest.param(n, marks=SLOW) for n in ("four_link", "five_link")),
-    ],
-)
+@pytest.mark.parametrize("name", ["two_link", "three_link", "small_gaits", *LONG])
 def test_errors_of_a_certificate_hold(solved, name):
     """Efficiency at delta, and for delta -> 0, against replays to 1e-9 at delta and at a
     ten-thousandth of it."""
     solution = solved(name)[0]
-    problem, path, known = solution.problem, solution.gait, solution.certificate
-    here, limit = (
-        replay(
-            problem.body, problem.friction, path, part * solution.delta_per_period, tolerance=1e-9
-        ).efficiency
-        for part in (1.0, 1e-4)
-    )
+    known, at = solution.certificate, (solution.problem.body, solution.problem.friction)
+    deltas = solution.delta_per_period * np.array([1.0, 1e-4])
+    here, limit = (replay(*at, solution.gait, d, tolerance=1e-9).efficiency for d in deltas)
     assert abs(known.efficiency - here) <= known.efficiency_error < 2e-6 * here
     assert abs(known.efficiency_at_zero_delta - limit) <= known.error_at_zero_delta < 1e-4 * limit
 
 
-def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly_and_wrong_by_no_more_than_its_values():
+def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly():
+    """And wrong by no more than its values."""
     linear = [0.25 + 3.0 * delta for delta in (1e-2, 1e-3, 1e-4)]
     found = extrapolated_limit(linear, [0.0, 0.0, 0.0])
     assert found.value == pytest.approx(0.25, abs=1e-15)
     assert found.error == pytest.approx(3e-4, rel=1e-9)
     # other parts may hide the linear one in the last change, never by chance in both: what it
     # leaves there is allowed for
-    hidden = extrapolated_limit(
-        [0.25 + 3.0 * 1e-2, 0.25 + 3.0 * 1e-3, 0.25 + 3.0 * 1e-3], [0.0, 0.0, 0.0]
-    )
-    assert hidden.error == pytest.approx(3.0 * 1e-4, rel=1e-9)
+    hidden = extrapolated_limit([linear[0], linear[1], linear[1]], [0.0, 0.0, 0.0])
+    assert hidden.error == pytest.approx(3e-4, rel=1e-9)
     # the last value is moved by a ninth of the last change: so is what it may be wrong by
     errors = [7e-3, 9e-4, 2e-4]
     assert extrapolated_limit([0.25] * 3, errors).error == pytest.approx(
@@ -287,10 +270,7 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(
     assert failures(gapped, open_by(2.5e-4)) == set()
     monkeypatch.setattr(replay_module, "replay", lambda *a, **k: open_by(5e-3)(1, replays[a[3]]))
     known = certify(three_link.answer)
-    assert (
-        min(known.efficiency_error / known.efficiency, known.error_at_zero_delta / known.efficiency)
-        >= 5e-3
-    )
+    assert min(known.efficiency_error, known.error_at_zero_delta) >= 5e-3 * known.efficiency
     assert known.errors["work"] >= 5e-3 * known.work
 
 
@@ -304,21 +284,17 @@ def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):
     judged("second order", lambda f: failures(curved(-f * 1e-2, 0.0)))
     judged("second order", lambda f: failures(curved(-f * 1e-2 - 0.5, 0.5)))
 
-    def meaning(solution):
-        return next(
-            check.meaning
-            for check in certify(solution.answer).checks
-            if check.name == "second order"
-        )
-
-    assert "a saddle" in meaning(curved(-0.02, 0.0))
-    assert "flat" in meaning(curved(1e-6, 1e-5))
-    assert "flat" in meaning(curved(0.02, 0.03))
-    assert "an optimum" in meaning(curved(0.5, 0.01))
-    assert "a vertex" in meaning(curved(np.inf, 0.0, 0))
-    assert "not measured" in meaning(
-        with_answer(three_link, second_order=SecondOrder(np.nan, np.nan, 0, "not measured"))
-    )
+    for measured, said in {
+        (-0.02, 0.0, 2): "a saddle",
+        (1e-6, 1e-5, 2): "flat",
+        (0.02, 0.03, 2): "flat",
+        (0.5, 0.01, 2): "an optimum",
+        (np.inf, 0.0, 0): "a vertex",
+        (np.nan, np.nan, 0, "not measured"): "not measured",
+    }.items():
+        solution = with_answer(three_link, second_order=SecondOrder(*measured))
+        checks = {check.name: check.meaning for check in certify(solution.answer).checks}
+        assert said in checks["second order"]
 
 
 @pytest.mark.parametrize("image", ["mirrored", "back in time", "from the other end"])
@@ -333,16 +309,9 @@ def test_no_check_knows_left_from_right_or_one_sense_from_the_other(image):
         "back in time": Fourier(gait.mean, gait.cos, -gait.sin),
         "from the other end": Fourier(gait.mean[::-1], gait.cos[::-1], gait.sin[::-1]),
     }[image]
-    problem = Problem(
-        "images",
-        friction=Friction(mu_t=1.7, mu_f=1, mu_b=1),
-        gait=Harmonic(2),
-        joint_limit=0.7,
-        speed_limit=4.0,
-        torque_limit=0.02,
-        power_limit=0.05,
-        delta=1e-2,
-    )
+    limits = {"joint_limit": 0.7, "speed_limit": 4.0, "torque_limit": 0.02, "power_limit": 0.05}
+    friction = Friction(mu_t=1.7, mu_f=1, mu_b=1)
+    problem = Problem("images", friction=friction, gait=Harmonic(2), delta=1e-2, **limits)
     one, two = (
         gait_certificate(problem, each, 1e-2, np.empty(0), instants=800, tolerance=1e-5)
         for each in (gait, other)
@@ -357,16 +326,9 @@ def test_no_check_knows_left_from_right_or_one_sense_from_the_other(image):
 def test_samples_make_every_error_larger_by_their_own_and_nothing_else_differs(three_link):
     known, samples = three_link.certificate, (1e-2, 2e-2, 3e-2, 4e-2)
     more = known.with_samples(samples)
-    value, efficiency, distance, work = samples
-    by = {
-        "value_error": value,
-        "value_error_at_zero_delta": value,
-        "efficiency_error": efficiency,
-        "error_at_zero_delta": efficiency,
-        "distance_error": distance,
-        "work_error": work,
-    }
-    assert more.numbers == pytest.approx(
-        {name: number + by.get(name, 0.0) for name, number in known.numbers.items()}, rel=1e-12
-    )
+    names = ("value_error", "efficiency_error", "distance_error", "work_error")
+    by = dict(zip(names, samples, strict=True))
+    by |= {"value_error_at_zero_delta": samples[0], "error_at_zero_delta": samples[1]}
+    wanted = {name: number + by.get(name, 0.0) for name, number in known.numbers.items()}
+    assert more.numbers == pytest.approx(wanted, rel=1e-12)
     assert more.by_replay.numbers == pytest.approx(known.numbers, rel=1e-9, abs=1e-15)

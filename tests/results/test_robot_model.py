@@ -1,5 +1,4 @@
-"""Models of robots for simulators: what they say of links, joints and masses, and that MuJoCo moves
-as colloc does."""
+"""Models of robots for simulators: links, joints and masses, and that MuJoCo moves as colloc does."""
 
 from xml.etree import ElementTree
 
@@ -14,26 +13,19 @@ from colloc.pictures.export import mjcf, urdf
 from colloc.results.solution import direction_of_travel
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
-MASSES, INERTIAS = (0.3, 0.2, 0.5), (0.002, 0.006, 0.001)
+UNEVEN, MASSES, INERTIAS = (0.2, 0.5, 0.3), (0.3, 0.2, 0.5), (0.002, 0.006, 0.001)
 
 
 @pytest.fixture(scope="module")
-def uneven():
+def uneven(unsolved):
     """Links of their own lengths, weights, masses and moments of inertia, ranges to one side, and
     feet."""
-    feet = (
-        Foot(0, 0.2, weight=0.2),
-        Foot(1, weight=0.5),
-        Foot(2, 0.7, offset=0.02, weight=0.15),
-        Foot(2, 0.7, offset=-0.02, weight=0.15),
-    )
-    body = Chain(
-        (0.2, 0.5, 0.3), weights=(0.2, 0.5, 0.3), feet=feet, masses=MASSES, inertias=INERTIAS
-    )
-    limits = ((-1.0, 2.0), 1.5)
-    friction, how = Friction(mu_t=2, mu_f=1, mu_b=1), {"joint_limit": limits, "delta": 1e-2}
-    problem = Problem("uneven", body=body, friction=friction, gait=Harmonic(1), **how)
-    return colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
+    pair = (Foot(2, 0.7, offset=side * 0.02, weight=0.15) for side in (1, -1))
+    feet = Foot(0, 0.2, weight=0.2), Foot(1, weight=0.5), *pair
+    body = Chain(UNEVEN, weights=UNEVEN, feet=feet, masses=MASSES, inertias=INERTIAS)
+    how = {"joint_limit": ((-1.0, 2.0), 1.5), "delta": 1e-2, "gait": Harmonic(1)}
+    gait, friction = colloc.ellipse(0.2, 0.6, 0.7), Friction(mu_t=2, mu_f=1, mu_b=1)
+    return unsolved(Problem("uneven", gait, body, friction, **how))
 
 
 def numbers(text):
@@ -97,11 +89,13 @@ def test_a_model_has_the_energy_and_the_centre_of_mass_of_the_robot(write, links
     assert moment == pytest.approx(SIZE["mass"] * size * centre, rel=1e-6)
 
 
-def test_every_contact_has_the_coefficients_of_its_own_foot_along_and_across(uneven, tmp_path):
+def test_every_contact_has_the_coefficients_of_its_own_foot_along_and_across(
+    uneven, unsolved, tmp_path
+):
     directed = Foot(1, friction=Friction(mu_t=3, mu_f=4, mu_b=1))
     body = Chain(feet=(Foot(0), directed, Wheel(2, rolling=0.04, sideways=1.0)))
-    problem = uneven.problem.with_(body=body, friction=Friction(9, 9, 9), joint_limit=3.0)
-    solution = colloc.evaluate(problem, colloc.ellipse(0.2, 0.6, 0.7))
+    other = {"body": body, "friction": Friction(9, 9, 9), "joint_limit": 3.0}
+    solution = unsolved(uneven.problem.with_(**other))
     root = ElementTree.fromstring(mjcf(solution.robot(**SIZE)))
     pairs = {x.get("geom2"): numbers(x.get("friction"))[:2] for x in root.iter("pair")}
     assert pairs == {"foot_1": [9, 9], "foot_2": [2, 3], "foot_3": [0.04, 1]}
@@ -128,41 +122,33 @@ def played(path, gait, period, periods=2):
     return np.moveaxis(places, 0, -1)
 
 
-UNEVEN = (0.2, 0.5, 0.3)
 TURNED = tuple(
     Wheel(k, 0.4, angle=s * (0.3, 1.5, 0.2)[k], offset=0.03 * s) for k in range(3) for s in (1, -1)
 )
-STANDING = {
-    "lying": (Chain(UNEVEN, masses=MASSES), Friction(), (0.2, 1.0, 0.9)),
-    "feet": (Chain(feet=1), Friction(), (0.0, 1.6, 1.1)),
-    "wheels": (
-        Chain(UNEVEN, feet=(Wheel(0), Wheel(1), Wheel(2)), masses=MASSES),
-        Friction(),
-        (0.0, 0.8, 0.6),
-    ),
-    "turned_wheels": (Chain(feet=TURNED), Friction(), (0.1, 0.8, 0.6)),
-    "pads": (
-        Chain(feet=tuple(Pad(link, 0.25, 0.75) for link in range(3))),
-        Friction(mu_t=2, mu_f=1, mu_b=1),
-        (0.0, 1.6, 1.1),
-    ),
-}
+WHEELS, PADS = tuple(map(Wheel, range(3))), tuple(Pad(link, 0.25, 0.75) for link in range(3))
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "pads")) for kind in STANDING]
+    ("body", "mu_t", "gait"),
+    [
+        (Chain(UNEVEN, masses=MASSES), 1, (0.2, 1.0, 0.9)),
+        (Chain(feet=1), 1, (0.0, 1.6, 1.1)),
+        (Chain(UNEVEN, feet=WHEELS, masses=MASSES), 1, (0.0, 0.8, 0.6)),
+        (Chain(feet=TURNED), 1, (0.1, 0.8, 0.6)),
+        pytest.param(Chain(feet=PADS), 2, (0.0, 1.6, 1.1), marks=pytest.mark.slow),
+    ],
+    ids=["lying", "feet", "wheels", "turned wheels", "pads"],
 )
-def test_a_file_moves_in_mujoco_as_it_is_written_as_colloc_says(kind, unsolved, tmp_path):
-    body, friction, gait = STANDING[kind]
-    solution = unsolved(
-        Problem(kind, colloc.ellipse(*gait), body, friction, Harmonic(1), delta=1e-3)
-    )
+def test_a_file_moves_in_mujoco_as_it_is_written_as_colloc_says(
+    body, mu_t, gait, unsolved, tmp_path
+):
+    gait, friction = colloc.ellipse(*gait), Friction(mu_t=mu_t, mu_f=1, mu_b=1)
+    solution = unsolved(Problem("moves", gait, body, friction, Harmonic(1), delta=1e-3))
     size = {"length": 1.04, "mass": 2.0, "period": 1.5}
     stated = solution.export(tmp_path / "x.xml", **size)
     centre, tail = played(tmp_path / "x.xml", solution.gait, size["period"])
-    assert np.hypot(*(centre[:, -1] - centre[:, 0])) / 1.04 == pytest.approx(
-        stated["moves_body_lengths_per_period"], rel=0.04
-    )
+    moved = np.hypot(*(centre[:, -1] - centre[:, 0])) / 1.04
+    assert moved == pytest.approx(stated["moves_body_lengths_per_period"], rel=0.04)
     assert direction_of_travel(centre, tail) == solution.robot(**size).facts["travels"]
 
 
@@ -206,6 +192,6 @@ def test_the_command_writes_both_and_says_what_is_missing(three_link, tmp_path, 
 
 def test_bodies_without_a_motor_in_every_joint_are_refused_in_a_sentence():
     gait = Coupled(Harmonic(1), stuck={1: 0.1})
-    problem = Problem("stuck", body=Chain((0.25,) * 4), gait=gait, delta=1e-2)
+    problem = Problem("stuck", body=Chain((0.25,) * 4), gait=gait, delta=0.1, mesh_tolerance=1e-2)
     with pytest.raises(ProblemError, match="of a Chain with a motor in every joint"):
         mjcf(colloc.evaluate(problem, colloc.ellipse(0, 1, 1)).robot(**SIZE))

@@ -1,10 +1,10 @@
-"""Gaits played with inertia: against a program of dense points and Newton's law, limits,
-symmetries, conservation."""
+"""Gaits played with inertia: against Newton's law for dense points, limits, conservation."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from shared.points import wrench
 
 import colloc
 from colloc.dynamics.slow_enough import SCHEME, played
@@ -16,113 +16,67 @@ from colloc.verification.differential_motion import GaitWithInertia, PeriodicRun
 GAIT = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 CHAIN, UNEQUAL = colloc.Chain(), colloc.Chain((0.3, 0.45, 0.25))
+HEAVY_HEAD = colloc.Chain((0.3, 0.45, 0.25), masses=(0.2, 0.2, 0.6), inertias=(0.001, 0.02, 0.001))
+"""Presses evenly; its head has little inertia."""
 ISOTROPIC, ANISOTROPIC = colloc.Friction(), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 
 
-def newtons_law(
-    lengths, mu, gait, delta, froude, steps=1200, periods=3, points=40, masses=None, inertias=None
-):
-    """Distance, work and rotation of the last period: mass points, differences in time, Runge and
-    Kutta's method."""
-    mu_t, mu_f, mu_b = mu
-    lengths = np.array(lengths)
-    masses = lengths if masses is None else np.array(masses)
-    along = (np.arange(points) + 0.5) / points
-    mass, weight = np.repeat(masses / points, points), np.repeat(lengths / points, points)
-    # what midpoints of cells miss of the links' inertia
-    cells = masses * lengths**2 / 12 if inertias is None else np.array(inertias)
-    cells = cells - masses * lengths**2 * ((along - 0.5) ** 2).mean()
+def newtons_law(body, law, gait, delta, froude, steps=400, periods=3):
+    """Distance, work and rotation of the last period by Newton's law, the forces on dense points,
+    and Runge and Kutta's method."""
+    mass, lengths = body.mass_column()[:, 0], np.array(body.lengths)
+    own = np.array(body.inertias) if body.inertias else mass * lengths**2 / 12
 
-    def tangents(t):
-        return np.concatenate([[0.0], np.cumsum(gait(np.array([t % 1.0]))[0][:, 0])])
-
-    def shape(t):
-        """Places of all points from the tail, and directions there, in the axes of the tail
-        link."""
-        turn = np.exp(1j * tangents(t))
-        ends = np.concatenate([[0.0], np.cumsum(lengths * turn)])
-        return (ends[:-1, None] + lengths[:, None] * along * turn[:, None]).ravel(), np.repeat(
-            turn, points
-        )
-
-    def known(t, h=1e-6):
-        place, turn = shape(t)
-        moving = (shape(t + h)[0] - shape(t - h)[0]) / (2 * h)
-        spins = (tangents(t + h) - tangents(t - h)) / (2 * h)
-        return place - mass @ place, moving - mass @ moving, turn, cells @ spins
-
-    def law(t, state, shape_now):
-        """Unknowns: orientation, place and velocity of the centre of mass in the plane, angular
-        momentum, work."""
-        place, moving, turn, own = shape_now
-        theta, velocity, h = state[0].real, state[2], state[3].real
-        inertia = mass @ np.abs(place) ** 2 + cells.sum()
-        omega = (h - mass @ (np.conj(place) * moving).imag - own) / inertia
-        v = velocity * np.exp(-1j * theta) + moving + 1j * omega * place
-        tangential, normal = (np.conj(turn) * v).real, (np.conj(turn) * v).imag
-        size = np.sqrt(np.abs(v) ** 2 + delta**2)
-        force = (
-            -turn
-            * (np.where(tangential > 0, mu_f, mu_b) * tangential + 1j * mu_t * normal)
-            / size
-            * weight
-        )
-        power = -(np.conj(force) * v).real.sum()
-        moment = (np.conj(place) * force).imag.sum()
-        pull = force.sum() * np.exp(1j * theta)
+    def changes(t, state):
+        """Of orientation, place and velocity of the centre of mass in the plane, angular momentum,
+        work."""
+        turn, velocity, angular = np.exp(1j * state[0].real), state[2], state[3].real
+        angles, rates = (each[:, 0] for each in gait(np.array([t % 1.0])))
+        spin, half = np.cumsum([0.0, *rates]), 0.5 * lengths * np.exp(1j * np.cumsum([0, *angles]))
+        # places and velocities of the middles of links from the tail, were it at rest
+        place, moving = (np.cumsum(2 * each) - each for each in (half, 1j * spin * half))
+        centre, drift = mass @ place, mass @ moving
+        place, moving = place - centre, moving - drift
+        swing = mass @ (np.conj(place) * moving).imag + own @ spin
+        omega = (angular - swing) / (mass @ np.abs(place) ** 2 + own.sum())
+        tail = velocity / turn - drift - 1j * omega * centre
+        z = np.array([tail.real, tail.imag, omega])
+        (fx, fy, torque), power, _ = wrench(body, law, angles, rates, z, delta, count=40)
+        moment = torque - (np.conj(centre) * (fx + 1j * fy)).imag
+        pull = (fx + 1j * fy) * turn
         return np.array([omega, velocity, pull / froude, moment / froude, power], dtype=complex)
 
     state, step = np.zeros(5, dtype=complex), 1.0 / steps
-    places = [known(0.5 * k * step) for k in range(2 * steps)]
     for _ in range(periods):
         before = state
-        for k in range(steps):
-            t, (first, middle, last) = (
-                k * step,
-                (places[2 * k], places[2 * k + 1], places[(2 * k + 2) % (2 * steps)]),
-            )
-            k1 = law(t, state, first)
-            k2 = law(t + step / 2, state + step / 2 * k1, middle)
-            k3 = law(t + step / 2, state + step / 2 * k2, middle)
-            k4 = law(t + step, state + step * k3, last)
+        for t in np.arange(steps) * step:
+            k1 = changes(t, state)
+            k2 = changes(t + step / 2, state + step / 2 * k1)
+            k3 = changes(t + step / 2, state + step / 2 * k2)
+            k4 = changes(t + step, state + step * k3)
             state = state + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     change = state - before
     return abs(change[1]), change[4].real, change[0].real
 
 
 @pytest.mark.parametrize(
-    ("lengths", "friction", "gait"),
+    ("body", "friction", "gait"),
     [
-        ((0.3, 0.45, 0.25), ANISOTROPIC, LEANING),
-        pytest.param((1 / 3, 1 / 3, 1 / 3), ISOTROPIC, GAIT, marks=pytest.mark.slow),
+        (UNEQUAL, ANISOTROPIC, LEANING),
+        (HEAVY_HEAD, ANISOTROPIC, LEANING),
+        pytest.param(CHAIN, ISOTROPIC, GAIT, marks=pytest.mark.slow),
     ],
+    ids=["unequal links", "masses and inertias", "equal links"],
 )
-def test_newtons_law_for_dense_points_says_the_same(lengths, friction, gait):
-    """A program that shares no line: error of 40 points a link, 1e-4."""
-    mu = friction.mu_t, friction.mu_f, friction.mu_b
-    distance, work, rotation = newtons_law(lengths, mu, gait, 0.05, 0.1)
-    played = colloc.inertial_motion(colloc.Chain(lengths), friction, gait, 0.05, 0.1)
-    assert played.distance == pytest.approx(distance, rel=1e-3)
-    assert played.work == pytest.approx(work, rel=1e-3)
+def test_newtons_law_for_dense_points_says_the_same(body, friction, gait):
+    """Error of 40 points a link, 1e-4; masses of its own move a body otherwise."""
+    distance, work, rotation = newtons_law(body, friction, gait, 0.05, 0.1)
+    played = colloc.inertial_motion(body, friction, gait, 0.05, 0.1)
+    assert (played.distance, played.work) == pytest.approx((distance, work), rel=1e-3)
     assert played.rotation == pytest.approx(rotation, abs=1e-3)
-
-
-def test_masses_and_inertias_of_ones_own_move_as_newtons_law_says():
-    """A body that presses evenly, with a heavy head of little inertia: a program that shares no
-    line."""
-    lengths, masses, inertias = (0.3, 0.45, 0.25), (0.2, 0.2, 0.6), (0.001, 0.02, 0.001)
-    distance, work, rotation = newtons_law(
-        lengths, (1.7, 1.0, 1.3), LEANING, 0.05, 0.1, masses=masses, inertias=inertias
-    )
-    own, plain = (
-        colloc.inertial_motion(body, ANISOTROPIC, LEANING, 0.05, 0.1)
-        for body in (colloc.Chain(lengths, masses=masses, inertias=inertias), UNEQUAL)
-    )
-    assert (own.distance, own.work) == pytest.approx((distance, work), rel=1e-3)
-    assert own.rotation == pytest.approx(rotation, abs=1e-3)
-    assert abs(own.distance / plain.distance - 1) > 0.05, (
-        "what it is compared with would be nothing"
-    )
+    if body.masses:
+        plain = colloc.inertial_motion(UNEQUAL, friction, gait, 0.05, 0.1)
+        assert abs(played.distance / plain.distance - 1) > 0.05
 
 
 def test_without_friction_momentum_is_conserved():
@@ -130,13 +84,10 @@ def test_without_friction_momentum_is_conserved():
     however its joints move."""
     angles, rates = LEANING(np.array([0.3]))
     states = np.array([[0.2], [-0.4], [0.05]])
-    now = momentum_rates(
-        CHAIN, colloc.Friction(1e-12, 1e-12, 1e-12), angles, rates, states, delta=1e-3, froude=1.0
-    )
-    omega = now.z[2, 0]
-    np.testing.assert_allclose(
-        now.rates[:, 0], [omega * states[1, 0], -omega * states[0, 0], 0.0], atol=1e-11
-    )
+    law = colloc.Friction(1e-12, 1e-12, 1e-12)
+    now = momentum_rates(CHAIN, law, angles, rates, states, delta=1e-3, froude=1.0)
+    seen = now.z[2, 0] * np.array([states[1, 0], -states[0, 0], 0.0])
+    np.testing.assert_allclose(now.rates[:, 0], seen, atol=1e-11)
 
 
 @pytest.mark.parametrize("mu", [0.02, 0.01])
@@ -182,16 +133,6 @@ def test_slow_motion_is_the_limit():
 
 
 @pytest.mark.slow
-def test_a_mirror_image_of_a_gait_turns_the_other_way():
-    mirrored = colloc.Fourier(mean=-LEANING.mean, cos=-LEANING.cos, sin=-LEANING.sin)
-    one, other = (
-        colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.2) for gait in (LEANING, mirrored)
-    )
-    assert one.rotation == pytest.approx(-other.rotation, abs=1e-5)
-    assert one.distance == pytest.approx(other.distance, rel=1e-4)
-
-
-@pytest.mark.slow
 def test_corners_are_passed_where_they_are():
     """A gait of straight lines between corners, against steps that know nothing of these but are
     small."""
@@ -208,23 +149,19 @@ def test_on_a_rougher_floor_slow_enough_is_as_much_faster_and_there_the_part_is_
         for mu in (1.0, 30.0)
     ]
     assert froude[1] == pytest.approx(30 * froude[0], rel=1e-6)
-    slow, played = (
-        colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2),
-        colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, froude[0]),
-    )
+    slow = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2)
+    played = colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, froude[0])
     assert abs(1 - played.efficiency / slow.efficiency) == pytest.approx(loss, rel=0.05)
 
 
 def test_a_gait_whose_efficiency_no_pace_changes_much_is_slow_enough_at_none():
     gait = colloc.ellipse(A0=0.3, A1=0.6, B1=0.5)
-    with pytest.raises(
-        colloc.NotConvergedError, match=r"by less than 0.3 up to a Froude number of 10\."
-    ):
+    said = r"by less than 0.3 up to a Froude number of 10\."
+    with pytest.raises(colloc.NotConvergedError, match=said):
         colloc.slow_enough(CHAIN, ISOTROPIC, gait, 1e-2, 0.3)
-    slow = colloc.replay(CHAIN, ISOTROPIC, gait, 1e-2).efficiency
-    assert (
-        abs(1 - colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 10.0).efficiency / slow) < 0.3
-    )
+    slow = colloc.replay(CHAIN, ISOTROPIC, gait, 1e-2)
+    fast = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 10.0)
+    assert abs(1 - fast.efficiency / slow.efficiency) < 0.3
 
 
 def test_what_inertia_takes_from_a_gait_that_turns_does_not_depend_on_where_its_period_begins():
@@ -236,43 +173,28 @@ def test_what_inertia_takes_from_a_gait_that_turns_does_not_depend_on_where_its_
     np.testing.assert_allclose(paces, paces[0], rtol=0.03)
 
 
-def test_what_has_no_inertia_is_refused_in_words():
-    with pytest.raises(colloc.ProblemError, match="froude must be"):
-        colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, 0.0)
-    with pytest.raises(colloc.ProblemError, match="of a ModalBody"):
-        colloc.slow_enough(colloc.ModalBody(), ISOTROPIC, GAIT, 1e-2)
-    with pytest.raises(colloc.ProblemError, match="pace is part"):
-        colloc.slow_enough(CHAIN, colloc.Viscous(), GAIT, 1e-2)
-    with pytest.raises(colloc.ProblemError, match="at most"):
-        colloc.slow_enough(CHAIN, ISOTROPIC, GAIT, 1e-2, loss=0.9)
-
-
 def test_a_body_from_rest_moves_as_newtons_law_says():
-    """A program that shares no line, its first and its second period from rest, which differ."""
-    lengths, mu = (0.3, 0.45, 0.25), (1.7, 1.0, 1.3)
-    begun = colloc.motion_from_rest(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1, periods=2)
-    expected = [newtons_law(lengths, mu, LEANING, 0.05, 0.1, periods=n) for n in (1, 2)]
+    """The first and the second period differ."""
+    at = UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1
+    begun = colloc.motion_from_rest(*at, periods=2)
+    expected = [newtons_law(*at, periods=n) for n in (1, 2)]
     np.testing.assert_allclose(begun.periods, expected, rtol=1e-3, atol=1e-3)
     assert abs(begun.periods[0, 0] / begun.periods[1, 0] - 1) > 0.02
 
 
 def test_periods_from_rest_become_alike_and_are_joined_without_a_gap():
-    begun = colloc.motion_from_rest(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1, periods=4)
-    played = colloc.inertial_motion(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1)
-    assert begun.periods[-1] == pytest.approx(
-        (played.distance, played.work, played.rotation), abs=1e-4
-    )
+    at = UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1
+    begun, played = colloc.motion_from_rest(*at, periods=4), colloc.inertial_motion(*at)
+    settled = played.distance, played.work, played.rotation
+    assert begun.periods[-1] == pytest.approx(settled, abs=1e-4)
     assert not begun.states[:, 0].any()
     assert np.abs(np.diff(begun.states, axis=1)).max() < 0.1
     assert begun.states[3, -1] == pytest.approx(begun.periods[:, 2].sum(), abs=1e-12)
     assert begun.states[6, -1] == pytest.approx(begun.periods[:, 1].sum(), abs=1e-12)
     vx, vy, _, theta, x, y, _ = begun.states
     moved = np.trapezoid(np.exp(1j * theta) * (vx + 1j * vy), begun.phases)
-    assert abs(x[-1] + 1j * y[-1] - moved) < 1e-4, (
-        "the way is that of the velocities, whatever the body has turned before"
-    )
-    with pytest.raises(colloc.ProblemError, match="whole number"):
-        colloc.motion_from_rest(UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1, periods=0)
+    # the way is that of the velocities, whatever the body has turned before
+    assert abs(x[-1] + 1j * y[-1] - moved) < 1e-4
 
 
 def test_a_stiff_body_glides_down_a_slope_that_is_steeper_than_friction():
@@ -290,14 +212,10 @@ def test_a_stiff_body_glides_down_a_slope_that_is_steeper_than_friction():
 
 def test_on_a_slope_slow_motion_is_approached_as_the_froude_number():
     at = CHAIN, ANISOTROPIC, LEANING, 3e-2
-    slow = colloc.slope_motion(*at, 0.2, theta=0.4).states[:3, -1]
-    off = [
-        np.abs(
-            colloc.motion_from_rest(*at, froude, periods=1, grade=0.2, theta=0.4).states[3:6, -1]
-            - slow
-        ).max()
-        for froude in (4e-3, 1e-3)
-    ]
+    how = {"grade": 0.2, "theta": 0.4}
+    slow = colloc.slope_motion(*at, **how).states[:3, -1]
+    ends = (colloc.motion_from_rest(*at, f, periods=1, **how).states[:, -1] for f in (4e-3, 1e-3))
+    off = [np.abs(end[3:6] - slow).max() for end in ends]
     assert off[1] < 2e-3
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.25)
 
@@ -324,9 +242,8 @@ def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_frictio
     law = standing.law(colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3))
     played = GaitWithInertia(standing, law, path, 1e-7, froude=0.02)
     _, slopes = played.period_map(played.momenta())
-    assert np.abs(slopes[:3]).max() < 1e-6, (
-        "friction leaves nothing of the momenta of the period before"
-    )
+    # friction leaves nothing of the momenta of the period before
+    assert np.abs(slopes[:3]).max() < 1e-6
     # some 30,000, by rounding, where more would let the first method give up
     assert len(asked) < 50_000
 

@@ -1,26 +1,22 @@
 """The replay against motions whose distance and work are known exactly."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Fourier, ellipse
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
+from colloc import Chain, Corners, Fourier, Friction, ellipse, replay
+from colloc.mechanics.contact import crossing_depth
 from colloc.verification.adaptive_motion import fine_motion
-from colloc.verification.replay import replay
+from tests.conftest import ROOT
 from tests.shared.laws import coulomb
 
 
 def test_reciprocal_gaits_go_nowhere():
-    gait = ellipse(0.0, 0.0, 1.2)
-    result = replay(
-        Chain(), Friction(), lambda t: (gait.angles(t), gait.rates(t)), 1e-4, instants=400
-    )
+    result = replay(Chain(), Friction(), ellipse(0.0, 0.0, 1.2), 1e-4, instants=400)
     assert result.distance < 1e-10
     assert result.work > 0.1
-    assert len(repr(result)) < 800, "the velocities are printed"
 
 
 def test_a_scallop_with_directional_friction_crawls_and_obeys_the_bound():
@@ -43,16 +39,9 @@ def random_path(seed):
     """A wave of two harmonics through three to five links, and a law."""
     rng = np.random.default_rng(seed)
     n_joint = int(rng.integers(2, 5))
-    gait = Fourier(
-        rng.uniform(-1, 1, n_joint),
-        rng.normal(0, 0.4, (n_joint, 2)),
-        rng.normal(0, 0.4, (n_joint, 2)),
-    )
-    return (
-        Chain((1 / (n_joint + 1),) * (n_joint + 1)),
-        coulomb(*LAWS[seed % 4]),
-        lambda t: (gait.angles(t), gait.rates(t)),
-    )
+    waves = rng.normal(0, 0.4, (2, n_joint, 2))
+    gait = Fourier(rng.uniform(-1, 1, n_joint), *waves)
+    return Chain((1 / (n_joint + 1),) * (n_joint + 1)), coulomb(*LAWS[seed % 4]), gait
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -78,12 +67,10 @@ class Roughly(Chain):
 
 def test_what_the_balance_leaves_over_is_part_of_the_error_that_is_asked_for():
     gait = ellipse(0.0, 2.8, 1.3)
-    found = replay(Roughly(), Friction(), gait, 1e-3, instants=40, tolerance=1e-4)
+    at = Friction(), gait, 1e-3
+    found, exact = (replay(b, *at, instants=40, tolerance=1e-4) for b in (Roughly(), Chain()))
     assert 0.9e-4 < found.error <= 1e-4
-    assert (
-        found.instants
-        > replay(Chain(), Friction(), gait, 1e-3, instants=40, tolerance=1e-4).instants
-    )
+    assert found.instants > exact.instants
 
 
 def test_panels_gather_at_kinks():
@@ -132,45 +119,10 @@ def test_another_followed_point_changes_the_distance_by_at_most_rotation_times_l
         assert np.abs(arms).max() <= result.lever <= 1
         # in any direction of travel the centre of mass may have had
         headings = np.exp(1j * np.linspace(0, 2 * np.pi, 60))
-        moved = np.abs(
-            result.distance * headings[:, None] + (np.exp(1j * result.rotation) - 1) * arms
-        )
+        swung = (np.exp(1j * result.rotation) - 1) * arms
+        moved = np.abs(result.distance * headings[:, None] + swung)
         change = np.abs(moved / result.distance - 1).max()
         assert 0.3 * result.turning < change <= result.turning
-
-
-def triangle(c, e):
-    """Joint one moves, then joint two, then both go back together, at unit rates per leg (a polygon
-    in shape space)."""
-    corners = np.array([[c + e, -c], [c, -c], [c, -c - e], [c + e, -c]])
-
-    def path(t):
-        leg = np.minimum((3 * t).astype(int), 2)
-        step = corners[leg + 1] - corners[leg]
-        return (corners[leg] + step * (3 * t - leg)[:, None]).T, 3 * step.T
-
-    return path
-
-
-@pytest.mark.slow
-def test_the_triangle_that_moves_one_joint_at_a_time_reaches_two_fifths():
-    values = []
-    for e in (0.2, 0.1, 0.05):
-        # corners of the polygon must be grid points: 3 divides the number of intervals
-        result = replay(
-            Chain(),
-            Friction(),
-            triangle(2.2, e),
-            1e-9,
-            instants=4800,
-            most_instants=4800,
-            tolerance=1e-9,
-        )
-        values.append((result.efficiency, result.distance / e, result.work / e))
-    efficiency, distance, work = np.array(values[-1])
-    assert abs(efficiency - 0.4) < 2e-3
-    assert abs(distance - 1 / 12) < 1e-3
-    assert abs(work - 5 / 24) < 2e-3
 
 
 def test_the_error_of_the_efficiency_is_made_of_those_of_distance_and_work():
@@ -179,3 +131,15 @@ def test_the_error_of_the_efficiency_is_made_of_those_of_distance_and_work():
     parts = result.errors["distance"] / result.distance + result.errors["work"] / result.work
     assert min(result.errors["distance"], result.errors["work"]) > 0
     assert result.error <= parts <= result.error + 2 * result.residual
+
+
+def test_the_best_polygon_that_is_known_is_replayed_at_its_value():
+    """Of three equal links within 2.5 rad, with 1940 corners."""
+    file = ROOT / "results/curated/many_corners.json"
+    stored = json.loads(file.read_text(encoding="utf-8"))
+    gait = Corners(stored["corners"], stored["symmetry"])
+    assert len(gait.corner_phases) + 1 == 1940
+    assert np.abs(gait.vertices).max() < 2.46
+    found = replay(Chain(), Friction(), gait, 1e-5 * gait.length, breaks=gait.corner_phases)
+    assert (found.efficiency, found.distance) == pytest.approx((0.448547, 0.677236), abs=2e-6)
+    assert crossing_depth(Chain(), gait.angles(np.linspace(0, 1, 20001))).max() == 0

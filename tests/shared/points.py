@@ -1,0 +1,26 @@
+"""A chain as points that touch the floor, walked through in the lab by complex numbers."""
+
+import numpy as np
+
+
+def wrench(body, law, angles, rates, z, delta, load=(0.0, 0.0), count=4000):
+    """Net force and torque about the tail, power and velocity of the centre of mass at one instant,
+    from `count` points on each line."""
+    phi, w = np.cumsum([0.0, *angles]), z[2] + np.cumsum([0.0, *rates])
+    step = np.array(body.lengths) * np.exp(1j * phi)
+    starts = np.concatenate([[0.0], np.cumsum(step)[:-1]])
+    moves = z[0] + 1j * z[1] + np.concatenate([[0.0], np.cumsum(1j * w * step)[:-1]])
+    mass, pull = body.mass_column()[:, 0], complex(*load)
+    middles, speeds = starts + 0.5 * step, moves + 0.5j * w * step
+    net, torque, power = pull, ((mass @ middles).conj() * pull).imag, 0.0
+    for part in body.contact.parts:
+        many, k = count if part.extent else 1, part.link
+        place = part.place + part.extent * ((np.arange(many) + 0.5) / many - 0.5)
+        arm = step[k] * place + 1j * part.offset * np.exp(1j * phi[k])
+        velocity, turn = moves[k] + 1j * w[k] * arm, np.exp(1j * (phi[k] + part.angle))
+        own = velocity / turn
+        fs, fn = (part.friction or law).density(own.real[None], own.imag[None], np.array([[delta]]))
+        force = part.weight / many * (fs[0] + 1j * fn[0]) * turn
+        net, torque = net + force.sum(), torque + ((starts[k] + arm).conj() * force).imag.sum()
+        power -= (force * velocity.conj()).real.sum()
+    return np.array([net.real, net.imag, torque]), power, mass @ speeds
