@@ -1,5 +1,4 @@
-"""What people type by mistake: every public function and class answers with a sentence, and numbers
-are what they are."""
+"""Every public name answers a mistake with a sentence, and numbers are what they are."""
 
 import inspect
 import json

@@ -1,5 +1,4 @@
-"""The benchmarks measure what they say: other tools get the same physics, and references are
-right."""
+"""Other tools get the same physics from the benchmarks, and references are right."""
 
 import numpy as np
 import pytest

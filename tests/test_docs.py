@@ -1,5 +1,4 @@
-"""The documentation says what is there: commands, options, links, numbers; messages are the
-program's, code is Python and runs."""
+"""The documentation says what is there; messages are the program's, and its code runs."""
 
 import ast
 import contextlib
@@ -95,8 +94,7 @@ def test_the_problem_of_the_tutorial_is_solved_by_its_own_text(tmp_path, capsys)
 
 
 def test_the_summary_quoted_in_the_tutorial_is_what_a_solve_says(three_link, solved):
-    """Words to the letter and numbers to three digits, but for times, roundings and counts of the
-    search."""
+    """Words to the letter and numbers to three digits, but for times and counts."""
     texts = blocks("docs/tutorial.md", "text")
     quoted = [block for block in texts if "distance d" in block or "gait   " in block]
     said = summary_lines(three_link, solved("three_link")[1])
@@ -143,8 +141,7 @@ def anchors(path):
 
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_links_lead_to_files_of_the_repository(page):
-    """As a code host follows them; the site has pages in place of some (`scripts.docs_site`), which
-    its strict build checks."""
+    """As a code host follows them; the site's strict build checks its own (`scripts.docs_site`)."""
     text = re.sub(r"```.*?```", "", read(page), flags=re.DOTALL)
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         if "://" not in target:
@@ -244,8 +241,7 @@ RUN = [
 
 @pytest.fixture
 def results_of_a_reader(three_link, tmp_path, monkeypatch):
-    """The files that pages speak of, in a folder of their own; the commands before a snippet would
-    have made them."""
+    """The files that pages speak of and that their commands would have made, in a folder."""
     monkeypatch.chdir(tmp_path)
     for name in ("mine", "three_link"):
         save(three_link, f"results/{name}.h5")

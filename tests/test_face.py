@@ -1,5 +1,4 @@
-"""What a person who imports colloc holds: light, complete, documented by examples that run, and
-clear about mistakes."""
+"""What `import colloc` gives: light, complete, with examples that run, clear about mistakes."""
 
 import ast
 import doctest

@@ -1,5 +1,4 @@
-"""The notebook of the documentation: it was run from top to bottom, its page shows all of it, and a
-new run says the same."""
+"""The notebook was run from top to bottom, its page shows it all, and a new run says the same."""
 
 import json
 import re
@@ -23,8 +22,7 @@ def said(cell):
 
 
 def numbers(text):
-    """Without signs: a gait and its mirror image are worth the same, and the last bit of a sine
-    says which is found."""
+    """Without signs: rounding decides between a gait and its mirror image, worth the same."""
     return [
         float(value)
         for value in re.findall(r"(?<![\w.])\d+\.\d+(?!e)(?:\b)", text.replace("-", " "))

@@ -1,5 +1,4 @@
-"""A body and a class of gaits that the library does not know, as the documentation writes them: one
-file each."""
+"""A body and a class of gaits of one's own, as the documentation writes them."""
 
 import re
 import sys
@@ -164,8 +163,7 @@ WEAK = Problem(
 
 
 def test_a_limit_of_your_own_is_kept_certified_stored_and_read(tmp_path):
-    """On the sum of all squared torques, which is what heats a motor: it binds, and does not
-    elsewhere."""
+    """On the sum of squared torques, which heats a motor: it binds here, and not elsewhere."""
     problem = WEAK.with_(
         torque_limit=None, limits=[PathLimit("heat", "sum(moment**2)", 0.005, both_ways=False)]
     )

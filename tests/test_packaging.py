@@ -1,5 +1,4 @@
-"""What packages are made from says the same everywhere: versions, requirements, the command, the
-files that go along."""
+"""Versions, requirements and the command are the same in all that packages are made from."""
 
 import re
 import tomllib

@@ -1,5 +1,4 @@
-"""The table of known gaits: what it says comes out of a replay, and only what is certified and
-better gets in."""
+"""The table of known gaits is what a replay finds, and only what is better gets in."""
 
 import json
 from concurrent.futures import ThreadPoolExecutor

@@ -1,5 +1,4 @@
-"""The modules of scripts/ and benchmarks/ fit the library as it is: each imports without doing
-anything and explains itself."""
+"""Each module of scripts/ and benchmarks/ imports without doing anything, and explains itself."""
 
 import ast
 import importlib
@@ -56,8 +55,7 @@ PROGRAMS = [path for path in MODULES if starts_itself(path) and path.stem not in
 
 @pytest.fixture
 def ended(tmp_path, monkeypatch, capfd):
-    """A function from a program and an option to its exit code and what it prints, out and as
-    errors; it writes nothing."""
+    """A function from a program and an option to its exit code, output and errors."""
 
     def run(path, option):
         needed(path)

@@ -1,5 +1,4 @@
-"""No gait beats the bound: thousands of random harmonic gaits and polygons, for several
-frictions."""
+"""No gait beats the bound: thousands of random ones, for several frictions."""
 
 import dataclasses
 from functools import cache
@@ -32,8 +31,7 @@ def isotropic() -> Bound:
 
 
 def antipodal_fourier(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random gaits q(t + 1/2) = -q(t): the second half mirrors the first, so any friction closes
-    the rotation."""
+    """Random gaits q(t + 1/2) = -q(t), so any friction closes the rotation."""
     t = (np.arange(STEPS) + 0.5) / STEPS
     k = 2 * np.pi * np.array([1, 3, 5])
     a, b = rng.standard_normal((2, 2, count, 3)) * [1.0, 0.4, 0.2]
@@ -45,8 +43,7 @@ def antipodal_fourier(rng: np.random.Generator, count: int) -> tuple[np.ndarray,
 
 
 def antipodal_polygons(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random polygons of three corners and their opposites, run through at constant speed on each
-    side."""
+    """Random polygons of three corners and their opposites, at constant speed on each side."""
     corners = rng.uniform(-1.0, 1.0, (2, count, 3)) * rng.uniform(0.1, 2.05, count)[:, None]
     corners = np.concatenate([corners, -corners], axis=2)
     sides = np.roll(corners, -1, axis=2) - corners
@@ -56,8 +53,7 @@ def antipodal_polygons(rng: np.random.Generator, count: int) -> tuple[np.ndarray
 
 
 def replayed(motion: CoulombMotion, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Distance of the middle link and work per period of gaits stored one after the other,
-    ``(count,)`` each."""
+    """Distance of the middle link and work of gaits stored one after the other."""
     spin = motion.spin.reshape(count, STEPS) / STEPS
     heading = np.cumsum(spin, axis=1) - 0.5 * spin
     v = (motion.velocity[0] + 1j * motion.velocity[1]).reshape(count, STEPS)
@@ -98,8 +94,7 @@ def test_no_random_gait_beats_the_bound(mu):
 
 
 def test_a_bound_is_pinned_from_both_sides(isotropic):
-    """It is reached at the motion it names, no smaller than the program's optimum, and random
-    motions do not exceed it."""
+    """Reached at the motion it names, at least the program's optimum, not exceeded."""
 
     def value(q, r):
         samples = Samples(
@@ -125,8 +120,7 @@ def test_a_bound_is_pinned_from_both_sides(isotropic):
 
 
 def test_small_gaits_at_the_fold_generate_their_directions():
-    """0.45606 at (pi, 0) from any first set of directions: the creases are found, where fixed sets
-    stop at 0.452."""
+    """0.45606 at (pi, 0) from any first directions; fixed sets stop at 0.452."""
     values = [
         small_gait(Chain(), Friction(), np.array([np.pi, 0.0]), n, 4).efficiency for n in (60, 74)
     ]
@@ -134,8 +128,7 @@ def test_small_gaits_at_the_fold_generate_their_directions():
 
 
 def test_small_gait_is_what_a_small_polygon_does():
-    """The linear program against a replay of the polygon it proposes; rotation of order size^2 is
-    left open."""
+    """Against a replay of the polygon it proposes, up to a rotation of order size^2."""
     shape = np.array([2.2, -2.2])
     gait = small_gait(Chain(), Friction(), shape, directions=360)
     for size in (0.04, 0.02):
@@ -170,8 +163,7 @@ def test_four_straight_links_crawl_sideways_by_bends_of_no_size():
 
 
 def test_small_gaits_of_many_joints_begin_with_directions_where_joints_and_links_rest():
-    """Five straight links: from directions at random alone, the column generation ended at
-    0.8624."""
+    """From directions at random alone, the column generation ended at 0.8624."""
     assert small_gait(Chain((0.2,) * 5), Friction(), np.zeros(4)).efficiency == pytest.approx(
         0.8640, abs=2e-4
     )
@@ -179,8 +171,7 @@ def test_small_gaits_of_many_joints_begin_with_directions_where_joints_and_links
 
 @pytest.mark.slow
 def test_the_best_small_gait_is_found_along_a_ridge_that_no_axis_follows():
-    """At (3, 1, 1) it lies on the line where both ends are bent alike; a search along the axes ends
-    at 0.188 beside it."""
+    """At (3, 1, 1) both ends are bent alike; along the axes a search ends at 0.188."""
     best, shape = best_small_gait(Chain(), Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0), 2.5)
     assert best.efficiency > 0.208
     assert shape[0] == pytest.approx(-shape[1], abs=5e-3)

@@ -1,5 +1,4 @@
-"""The multipliers of the bound's program are a motion: they close in the mean, and travel as far as
-the program says."""
+"""The multipliers of the bound's program are a motion that closes in the mean."""
 
 import numpy as np
 import pytest

@@ -9,7 +9,17 @@ import pytest
 from scipy import sparse
 from scipy.optimize import linprog
 
-from colloc import solve_balance
+from colloc import (
+    Chain,
+    Elliptic,
+    Foot,
+    Friction,
+    Harmonic,
+    ModalBody,
+    Problem,
+    Viscous,
+    solve_balance,
+)
 from colloc.bounds.motions import (
     CoulombMotion,
     Domain,
@@ -20,14 +30,7 @@ from colloc.bounds.motions import (
 from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline, largest_gain
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, smallest_maximum
-from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.problem import Problem
-from colloc.laws.resistance import Viscous
 from colloc.mechanics.balance import instant, total_power
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.floor_contact import Foot
-from colloc.mechanics.friction import Friction
-from colloc.smooth.modal_body import ModalBody
 from colloc.system.errors import ProblemError, StoreError
 from research.small_gaits import small_gait
 from tests.shared.laws import coulomb
@@ -113,8 +116,7 @@ def test_two_links_rest_while_those_between_buckle_or_turn_as_a_four_bar_linkage
 
 
 def test_lattices_of_four_links_hold_what_buckles_between_two_resting_links():
-    """Links 2 and 3 of the straight body with the ends at rest: without it a bound had converged at
-    0.717, where loops of no size about the straight body do 0.732."""
+    """Without links 2 and 3 that buckle a bound converged at 0.717, and small loops do 0.732."""
     motion = Domain(Chain((0.25,) * 4), Friction(), 2.5).lattice(6, 10, 0.2)
     buckles = np.abs(np.abs(motion.rates.T @ np.array([1, -2, 1])) / np.sqrt(6) - 1) < 1e-9
     assert buckles.sum() > 20
@@ -172,8 +174,7 @@ def test_rows_are_the_gain_and_its_derivatives():
 )
 @pytest.mark.parametrize("mu", FRICTIONS)
 def test_mirror_images_and_end_swap_move_alike(mu, lengths):
-    """The symmetries that halve the unknowns hold for the solved motions, and so for the ratio of
-    any symmetric potential."""
+    """The symmetries that halve the unknowns hold for solved motions."""
     friction, body, rng = coulomb(*mu), Chain(lengths), np.random.default_rng(9)
     q, r = rng.uniform(-2.0, 2.0, (body.n_joint, 80)), rng.normal(size=(body.n_joint, 80))
     space = PotentialSpace(
@@ -188,8 +189,7 @@ def test_mirror_images_and_end_swap_move_alike(mu, lengths):
 
 
 def test_centre_of_mass_gives_exactly_one_for_isotropic_friction():
-    """|int V ds| <= int |V| ds, with equality for a translation: the centre of mass alone proves 1
-    and no less."""
+    """|int V ds| <= int |V| ds, with equality for a translation."""
     body, rng = Chain(), np.random.default_rng(11)
     q, r = random_points(12, 2000)
     z = rng.standard_normal((3, 2000))
@@ -203,8 +203,7 @@ def test_centre_of_mass_gives_exactly_one_for_isotropic_friction():
 
 
 def test_two_links_with_reversible_friction_cannot_move():
-    """A path in one angle retraces itself, so the true bound is 0; splines approach it as their
-    knots get finer."""
+    """A path in one angle retraces itself: finer splines approach a bound of 0."""
     budgets = [Budget(n, (1,), 64, 1, first=n) for n in (8, 16, 32)]
     begin = time.process_time()
     bounds = [efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=budget) for budget in budgets]
@@ -234,8 +233,7 @@ def test_two_links_with_directed_friction_can_and_obey_the_coefficient_bound():
 
 
 def test_minimax_program_agrees_with_a_simplex_solver():
-    """The interior-point optimum against HiGHS, and its multipliers as a proof of the value (weak
-    duality)."""
+    """Against HiGHS, and its multipliers as a proof of the value (weak duality)."""
     rng = np.random.default_rng(15)
     rows, constants = rng.standard_normal((60, 8)), rng.uniform(0.0, 1.0, 60)
     best = smallest_maximum(sparse.csr_matrix(rows), constants, sparse.csr_matrix((8, 8)))
@@ -265,8 +263,7 @@ def test_roughness_is_the_integral_of_squared_second_derivatives(n_joint):
 
 
 def test_climbs_find_the_summit_of_a_crease():
-    """A crease at an angle to all axes: coordinate steps would stop on it, random directions do
-    not."""
+    """A crease at an angle to all axes, on which coordinate steps would stop."""
     domain = Domain(Chain(), Friction(), 2.0)
     start = domain.lattice(6, 12).take(np.arange(0, 120, 4))
 
@@ -281,8 +278,7 @@ def test_climbs_find_the_summit_of_a_crease():
 
 
 def test_peaks_where_one_joint_turns_alone_are_met_and_climbed_along():
-    """Seen at (1.82, -1.82) with rates (1, 0): a cone that falls by 3.6 a radian, so that no
-    lattice of directions meets it."""
+    """Seen at (1.82, -1.82): a cone that falls by 3.6 a radian, between any lattice."""
     domain = Domain(Chain(), Friction(), 2.5)
     lattice = domain.lattice(8, 24, 0.37)
     alone = np.flatnonzero(lattice.rates[1] == 0)
@@ -299,8 +295,7 @@ def test_peaks_where_one_joint_turns_alone_are_met_and_climbed_along():
 
 @pytest.mark.parametrize("shift", [0.0, 0.37])
 def test_lattices_hold_the_corners_between_limit_and_contact(shift):
-    """A potential that had converged at 0.8609 stood at 1.0283 in such a corner, (2.5, 1.8911),
-    where nothing was sampled."""
+    """A potential that had converged at 0.8609 stood at 1.0283 in such a corner."""
     angles = Domain(Chain(), Friction(mu_t=0.5, mu_f=1, mu_b=5), 2.5).lattice(8, 6, shift).angles
     assert np.abs(angles - np.array([[2.5], [1.89109]])).sum(axis=0).min() < 1e-4
     assert np.isclose(angles.max(), 2.5)  # and the limit
@@ -319,10 +314,10 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     keys = {
         bound_key(Domain(b, f, a), tiny)
         for b in (Chain(), Chain((0.3, 0.4, 0.3)))
-        for f in (Friction(), Friction(mu_b=2.0))
+        for f in (Friction(), Friction(mu_t=2.0), Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0))
         for a in (2.0, 2.5)
     }
-    assert len(keys) == 8
+    assert len(keys) == 12
     cache.write_text("{")
     with pytest.raises(StoreError, match="cannot be read"):
         efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
@@ -330,8 +325,7 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("lengths", [(0.4, 0.6), (0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
 def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
-    """The midpoint of the middle link, or the middle joint along the mean heading there, from
-    positions a moment later."""
+    """The middle link's midpoint, or the middle joint along the mean heading there."""
     body, rng, h = Chain(lengths), np.random.default_rng(41), 1e-6
     n = body.n_link
     angles, rates = rng.uniform(-1, 1, (n - 1, 20)), rng.normal(size=(n - 1, 20))
@@ -354,8 +348,7 @@ def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
 def test_on_feet_the_centre_of_pressure_is_followed_and_no_faster_than_friction_pays_for(lengths):
-    """Its velocity in the axes of the middle, from places of the feet a moment later; so no
-    potential at all says 1/mu."""
+    """From places of the feet a moment later; so no potential at all says 1/mu."""
     n, rng, h = len(lengths), np.random.default_rng(43), 1e-6
     body = Chain(
         lengths,
@@ -394,8 +387,7 @@ def test_no_bound_says_less_than_friction_alone():
 
 
 def test_climbs_go_along_creases_where_one_joint_rests():
-    """A crease in the rate of joint 2 at every shape: only steps that leave it at rest stay on the
-    crease."""
+    """A crease in the rate of joint 2: only steps that leave it at rest stay there."""
     domain = Domain(Chain((0.25,) * 4), Friction(), 2.5)
     lattice = domain.lattice(4, 10, 0.2)
     start = lattice.take(

@@ -1,5 +1,4 @@
-"""Orientation and place along a collocation mesh: a circle, the order of the scheme, derivatives,
-and which way a gait goes."""
+"""Orientation and place along a mesh: a circle, orders, derivatives, and headings."""
 
 import numpy as np
 import pytest
@@ -70,8 +69,7 @@ def test_the_displacement_has_the_slopes_of_differences(name):
 
 
 def test_a_gait_goes_where_its_whole_period_leads():
-    """The second half of an antipodal gait is the mirror image of the first, from where that left
-    the body."""
+    """The second half of an antipodal gait mirrors the first, from where that ended."""
     displacement, rotation = 0.3 * np.exp(0.9j), 0.5
     whole = displacement + np.exp(1j * rotation) * np.conj(displacement)
     for end in (displacement, -displacement):

@@ -1,5 +1,4 @@
-"""States followed through a period: a closed form, a jump in the rates, and what the tolerance
-promises."""
+"""States followed through a period: a closed form, jumps, and what tolerances promise."""
 
 import threading
 import warnings
@@ -33,8 +32,7 @@ def test_three_states_are_those_of_the_closed_form_within_the_tolerance(toleranc
 
 
 def test_a_jump_of_the_rates_is_met_from_both_sides():
-    """s' = -1, then 3: asked for at 0.3 itself the later rate never counts for the earlier
-    piece."""
+    """s' = -1, then 3: the later rate never counts for the earlier piece."""
     seen = []
 
     def rates(t, state, _):
@@ -51,8 +49,7 @@ def test_a_jump_of_the_rates_is_met_from_both_sides():
 
 @pytest.mark.parametrize(("others", "asks"), [(True, False), (True, True), (False, False)])
 def test_where_one_method_gives_up_or_asks_without_end_another_goes_on(monkeypatch, others, asks):
-    """As where friction is far stiffer than the body is slow to move; where none goes on, a
-    sentence says how far."""
+    """As where friction is stiff; where none goes on, a sentence says how far."""
 
     def gives_up(*given, method, **how):
         while asks and method == "LSODA":

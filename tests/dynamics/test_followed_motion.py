@@ -19,8 +19,7 @@ def random_path(seed):
 
 
 def step_by_step(path, sense, n=2500):
-    """Efficiency of a body that goes through the period in small steps, each solved from the one
-    before."""
+    """Efficiency of a body in small steps, each solved from the one before."""
     t = (np.arange(n) + 0.5) / n
     angles, rates = path(t)
     z = solve_balance(BODY, STEEP, angles[:, :1], rates[:, :1], 1e-4).z
@@ -37,8 +36,7 @@ def step_by_step(path, sense, n=2500):
 
 
 def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
-    """Panels count as at the worse of their ends, so a little more; and never more than all of
-    it."""
+    """Panels count as at the worse of their ends, so a little more."""
     path, t = random_path(3), (np.arange(2000) + 0.5) / 2000
     several = (all_balanced_velocities(BODY, STEEP, *path(t), 1e-4).number > 1).mean()
     found = replay(BODY, STEEP, path, 1e-4, instants=1600, most_instants=1600)
@@ -75,8 +73,7 @@ def test_velocities_put_on_one_branch_are_of_motions_that_last(seed):
 
 @pytest.mark.parametrize("seed", [3, 5])
 def test_the_adaptive_motion_follows_the_branch_that_the_replay_follows(seed):
-    """Solved for one by one, instants fall on either branch, and these lie 6 % and 0.03 % apart in
-    the efficiency."""
+    """One by one, instants fall on either branch, up to 6 % apart in the efficiency."""
     at = BODY, STEEP, random_path(seed), 1e-4
     fine, expected = fine_motion(*at, np.linspace(0, 1, 61), 1e-6), replay(*at).efficiency
     assert abs(fine.path[-1]) / fine.totals[0, -1] == pytest.approx(expected, rel=1e-5)

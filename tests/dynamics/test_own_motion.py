@@ -109,8 +109,7 @@ class Pushed(Regime):
 
 
 class Gait:
-    """Its differential equation: orientation, place, work of the joints, and friction's less the
-    push's."""
+    """Orientation, place, work of the joints, and friction's less the push's."""
 
     def __init__(self, body, friction, path, delta, push):
         self.at, self.path, self.delta, self.push = (body, friction), path, delta, push

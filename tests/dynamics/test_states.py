@@ -13,8 +13,7 @@ SIZES = (1, 2, 3)
 
 
 def spring(k, push=1.0):
-    """States that are pulled to 0, unevenly and by each other, and pushed to and fro once a
-    period."""
+    """States pulled to 0 unevenly and by each other, and pushed to and fro."""
     rng = np.random.default_rng(k)
     matrix = 2.0 * np.eye(k) + 0.5 * rng.normal(size=(k, k))
 

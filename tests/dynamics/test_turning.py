@@ -29,8 +29,7 @@ def replayed(path=GAIT, turn=0.0):
 
 
 def on_a_dense_grid(path, n=4000):
-    """Rotation of a period and its places, by the trapezoidal rule on a uniform grid: of smooth
-    periodic motion it is exact."""
+    """Rotation and places by the trapezoidal rule, exact for smooth periodic motion."""
     t = np.arange(n) / n
     angles, rates = path(t)
     solved = BODY.solve(FRICTION, angles, rates, DELTA)

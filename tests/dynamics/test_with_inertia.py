@@ -121,8 +121,7 @@ def test_gradients_are_those_of_differences(fields):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypatch):
-    """Momenta as large as a body has that crosses its length in a period lead to those that the
-    slow motion leads to. The kernel goes NumPy's way."""
+    """From momenta of a body length a period. The kernel goes NumPy's way."""
     stated = problem(body=STANDING, delta=1e-4, froude=0.02, intervals=60)
     space, _ = space_near(stated, LEANING)
     angles, rates = LEANING(space.mesh.times)
@@ -202,8 +201,7 @@ def test_what_a_gait_that_turns_is_worth_slowly_is_the_limit_of_slow_paces():
 
 
 def test_a_body_that_begins_at_rest_comes_to_move_as_certified(paced):
-    """Its centre of mass is at rest at first, and after some periods goes as far in each as in the
-    motion of equal periods."""
+    """At rest at first, after some periods as far in each as in equal periods."""
     found, moved = paced, paced.from_rest(np.arange(0.0, 6.001, 0.01))
     ways = np.hypot(*np.diff(moved.centre[:, ::100], axis=1))
     assert np.hypot(*(moved.centre[:, 1] - moved.centre[:, 0])) < 1e-3
@@ -229,8 +227,7 @@ def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do():
 
 
 def test_two_equal_links_go_nowhere_by_an_antipodal_gait():
-    """They move along their axis of symmetry, and as far back while bent to the other side; links
-    that differ do not."""
+    """As far back while bent to the other side; links that differ do not."""
     gait = colloc.Fourier(mean=[0.0], cos=[[1.1, 0.0, 0.3]], sin=[[0.0, 0.0, 0.4]])
 
     def distance(body):

@@ -51,8 +51,7 @@ def test_samples_without_a_trend_are_dry_friction():
 
 
 def test_a_few_samples_are_not_read_as_more_than_a_number_or_two():
-    """Any three numbers lie on a curve of three terms; noise would have become a law that vanishes
-    at rest."""
+    """Noise in three numbers would have become a law that vanishes at rest."""
     for along in ((0.5, 0.52, 0.53), (0.5, 0.52, 0.51)):
         law = fitted_friction(np.column_stack([[0.1, 0.2, 0.3], along, along])).law
         assert isinstance(law, Friction)

@@ -1,24 +1,18 @@
-"""What every law of friction has to be: dissipative, the same in any frame, integrated along links
-as at points."""
+"""What every law of friction has to be: dissipative, the same in any frame, and along links."""
 
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from colloc.bounds.motions import Domain
-from colloc.bounds.sampled import QUICK, bound_key
+from colloc import Chain, Elliptic, Friction, ModalBody, OwnLaw, PowerLaw, Viscous, solve_balance
 from colloc.gaits.gait_fields import LAWS, fields, law_from
-from colloc.laws.own_law import OwnLaw
-from colloc.laws.resistance import Elliptic, PowerLaw, Viscous
 from colloc.mechanics.balance import balance_jacobian, instant
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import motion_and_derivatives
-from colloc.mechanics.friction import ClosedForm, Friction, line_integrals
+from colloc.mechanics.friction import ClosedForm, line_integrals
 from colloc.mechanics.law import Law
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
-from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.smooth_body import accurate_motion
 
 LENGTHS = Chain().length_column()
@@ -33,6 +27,7 @@ EVERY = [
     OWN,
 ]
 ASSOCIATED = [
+    Friction(),
     Elliptic(mu_t=0.3, mu_f=1.0, mu_b=4.0),
     Viscous(normal=1.8, tangential=1.0),
     PowerLaw(0.4, 1.5, 1.5, 1.5),
@@ -64,14 +59,12 @@ def test_friction_opposes_the_motion_and_does_not_tell_left_from_right(law):
 def test_a_law_in_other_units_is_the_same_law(law):
     vs, vn, _ = moving_links(2)
     force = np.array(law.density(vs, vn, 1e-2))
-    np.testing.assert_allclose(
-        law.in_speeds_of(4.0).density(vs / 4, vn / 4, 1e-2 / 4), force, rtol=1e-13
-    )
+    slower = law.in_speeds_of(4.0).density(vs / 4, vn / 4, 1e-2 / 4)
+    np.testing.assert_allclose(slower, force, rtol=1e-13)
     np.testing.assert_allclose(law.in_units_of(3.0).density(vs, vn, 1e-2), force / 3, rtol=1e-13)
     if law.degree is not None:
-        np.testing.assert_allclose(
-            law.density(2 * vs, 2 * vn, 2e-2), 2**law.degree * force, rtol=1e-13
-        )
+        faster = law.density(2 * vs, 2 * vn, 2e-2)
+        np.testing.assert_allclose(faster, 2**law.degree * force, rtol=1e-13)
     if law.reversible:
         np.testing.assert_allclose(law.density(-vs, -vn, 1e-2), -force, rtol=1e-13)
 
@@ -80,11 +73,10 @@ def test_a_law_in_other_units_is_the_same_law(law):
 def test_the_secant_of_a_power_law_is_no_less_than_its_slope(power):
     """Steps by the secant then never go too far, above degree 1 as below it."""
     law, (vs, vn, _) = PowerLaw(power, 1.5, 1.5, 1.5), moving_links(4)
-    gap = np.array(law.density_secant(vs, vn, 1e-2)) - np.array(law.density_jacobian(vs, vn, 1e-2))
-    size = np.abs(np.array(law.density_secant(vs, vn, 1e-2))).max(axis=(0, 1))
-    assert (
-        np.linalg.eigvalsh(np.moveaxis(gap, (0, 1), (-2, -1))).min(axis=-1) > -1e-12 * size
-    ).all()
+    secant = np.array(law.density_secant(vs, vn, 1e-2))
+    gap = np.moveaxis(secant - np.array(law.density_jacobian(vs, vn, 1e-2)), (0, 1), (-2, -1))
+    size = np.abs(secant).max(axis=(0, 1))
+    assert (np.linalg.eigvalsh(gap).min(axis=-1) > -1e-12 * size).all()
 
 
 def test_the_secant_of_formulas_that_are_dry_in_each_direction_does_not_vanish():
@@ -103,44 +95,32 @@ def test_forces_on_links_are_integrals_of_the_force_on_points(law):
     for link, t in np.ndindex(3, 4):
         vs, vn, w = velocity[:, link, t]
         half = 0.5 * LENGTHS[link, 0]
-        kinks = [p for p in (-vn / w,) if abs(p) < half]
+        scale = max(abs(part[link, t]) for part in force)
+        how = {"points": [-vn / w] if abs(vn / w) < half else None, "limit": 400}
+        how |= {"epsabs": 1e-12 * scale, "full_output": 1}
 
-        def at(sigma, vs=vs, vn=vn, w=w):
+        def at(sigma, k, vs=vs, vn=vn, w=w):
             fs, fn = law.density(np.array([[vs]]), np.array([[vn + w * sigma]]), 1e-3)
-            return np.array([fs[0, 0], fn[0, 0], sigma * fn[0, 0]])
+            return (fs[0, 0], fn[0, 0], sigma * fn[0, 0])[k]
 
         for k, whole in enumerate(force):
-            scale, settings = (
-                max(abs(f[link, t]) for f in force),
-                {"points": kinks or None, "limit": 400},
-            )
-            expected = quad(
-                lambda s, k=k, at=at: at(s)[k],
-                -half,
-                half,
-                epsabs=1e-12 * scale,
-                full_output=1,
-                **settings,
-            )[0]
+            expected = quad(at, -half, half, (k,), **how)[0]
             assert abs(whole[link, t] - expected) < 1e-8 * scale
 
 
 @each
 def test_jacobians_are_the_derivatives(law):
-    velocity, step = moving_links(4), 1e-6
-    for matrix, force, v in (
-        (law.density_jacobian(*velocity[:2], 0.05), lambda v: law.density(*v, 0.05), velocity[:2]),
-        (
-            line_integrals(law).jacobian(*velocity, LENGTHS, 0.05),
-            lambda v: line_integrals(law).force(*v, LENGTHS, 0.05),
-            velocity,
-        ),
+    velocity, step, on_links = moving_links(4), 1e-6, line_integrals(law)
+    for slopes, force, known, at in (
+        (law.density_jacobian, law.density, velocity[:2], (0.05,)),
+        (on_links.jacobian, on_links.force, velocity, (LENGTHS, 0.05)),
     ):
-        for j, shift in enumerate(step * np.eye(len(v))[:, :, None, None] * np.abs(v).max(axis=0)):
-            numeric = (np.array(force(v - shift)) - np.array(force(v + shift))) / (
-                2 * np.abs(shift[j])
-            )
-            found = np.array([np.broadcast_to(row[j], v[0].shape) for row in matrix])
+        steps = step * np.eye(len(known))[:, :, None, None] * np.abs(known).max(axis=0)
+        for j, shift in enumerate(steps):
+            ahead, behind = (np.array(force(*(known + sign * shift), *at)) for sign in (1, -1))
+            rows = slopes(*known, *at)
+            found = np.array([np.broadcast_to(row[j], known[0].shape) for row in rows])
+            numeric = (behind - ahead) / (2 * np.abs(shift[j]))
             np.testing.assert_allclose(found, numeric, atol=1e-6 * max(1.0, np.abs(found).max()))
 
 
@@ -154,9 +134,7 @@ def test_a_full_program_s_rows_vanish_where_forces_obey_the_law(law):
 
 
 @each
-def test_a_balanced_body_pays_with_its_joints_what_friction_takes_whatever_end_it_is_named_from(
-    law,
-):
+def test_joints_pay_what_friction_takes_whatever_end_a_balanced_body_is_named_from(law):
     body, (angles, rates) = Chain(), instants(6)
 
     def moved(angles, rates):
@@ -172,76 +150,48 @@ def test_a_balanced_body_pays_with_its_joints_what_friction_takes_whatever_end_i
         swapped = moved(-angles[::-1], -rates[::-1])
         np.testing.assert_allclose(swapped.power, now.power, rtol=1e-7)
         np.testing.assert_allclose(
-            np.linalg.norm(swapped.centre, axis=0), np.linalg.norm(now.centre, axis=0), rtol=1e-7
+            *(np.linalg.norm(each.centre, axis=0) for each in (swapped, now)), rtol=1e-7
         )
 
 
 @each_associated
 def test_an_associated_law_is_the_gradient_of_a_convex_function(law):
-    velocity, h = moving_links(8), 1e-6
-    jacobian = np.array(
-        [
-            [np.broadcast_to(e, velocity[0].shape) for e in row]
-            for row in line_integrals(law).jacobian(*velocity, LENGTHS, 0.1)
-        ]
-    )
-    np.testing.assert_allclose(
-        jacobian, jacobian.swapaxes(0, 1), atol=1e-12 * np.abs(jacobian).max()
-    )
+    velocity, h, on_links = moving_links(8), 1e-6, line_integrals(law)
+    rows = on_links.jacobian(*velocity, LENGTHS, 0.1)
+    jacobian = np.array([[np.broadcast_to(e, velocity[0].shape) for e in row] for row in rows])
+    atol = 1e-12 * np.abs(jacobian).max()
+    np.testing.assert_allclose(jacobian, jacobian.swapaxes(0, 1), atol=atol)
     assert np.linalg.eigvalsh(np.moveaxis(jacobian, (0, 1), (-2, -1))).min() > 0
-    force = line_integrals(law).force(*velocity, LENGTHS, 0.1)
+    force = on_links.force(*velocity, LENGTHS, 0.1)
     for j, shift in enumerate(h * np.eye(3)[:, :, None, None] * np.abs(velocity).max(axis=0)):
-        ahead, behind = (
-            line_integrals(law).potential(*(velocity + sign * shift), LENGTHS, 0.1)
-            for sign in (1, -1)
-        )
-        np.testing.assert_allclose(
-            (ahead - behind) / (2 * np.abs(shift[j])), -force[j], atol=1e-6 * np.abs(force[j]).max()
-        )
+        ahead, behind = (on_links.potential(*(velocity + s * shift), LENGTHS, 0.1) for s in (1, -1))
+        slope, atol = (ahead - behind) / (2 * np.abs(shift[j])), 1e-6 * np.abs(force[j]).max()
+        np.testing.assert_allclose(slope, -force[j], atol=atol)
 
 
 def test_where_coulomb_friction_leaves_three_motions_the_elliptic_law_leaves_one():
     body, angles, rates = Chain(), np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]])
-    several = all_balanced_velocities(
-        body, Friction(mu_t=1, mu_f=0.01, mu_b=100), angles, rates, 1e-4
-    )
+    steep, law = (law(mu_t=1, mu_f=0.01, mu_b=100) for law in (Friction, Elliptic))
+    several = all_balanced_velocities(body, steep, angles, rates, 1e-4)
     assert several.number.tolist() == [3]
-    law = Elliptic(mu_t=1, mu_f=0.01, mu_b=100)
     found = [body.solve(law, angles, rates, 1e-4, start=z).require() for z in several.z]
     for one in found:
         np.testing.assert_allclose(one.z, found[0].z, atol=1e-6)
     at = instant(body, law, angles, rates, found[0].z, 1e-4)
-    assert (
-        np.linalg.eigvalsh(
-            balance_jacobian(body, law, at.posture, at.velocity, np.full((1, 1), 1e-4))
-        ).min()
-        > 0
-    )
+    matrix = balance_jacobian(body, law, at.posture, at.velocity, np.full((1, 1), 1e-4))
+    assert np.linalg.eigvalsh(matrix).min() > 0
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.7])
 def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_last_digit(mu):
-    body, (angles, rates) = Chain(), instants(9, 40)
-    for law_of in (Friction, Elliptic):
-        law = law_of(mu, mu, mu)
-        solved = body.solve(law, angles, rates, 1e-6).require()
-        found = [
-            solved.z,
-            body.motion(law, angles, rates, 1e-6, solved).power,
-            motion_and_derivatives(body, law, angles, rates, 1e-6, solved)[1],
-        ]
-        if law_of is Friction:
-            expected = found
-    for a, b in zip(expected, found, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
-def test_bounds_of_the_two_laws_are_kept_apart():
-    keys = {
-        bound_key(Domain(Chain(), law, 3.0), QUICK)
-        for law in (Friction(mu_t=2, mu_f=1, mu_b=1), Elliptic(mu_t=2, mu_f=1, mu_b=1))
-    }
-    assert len(keys) == 2
+    found = []
+    for law in (Friction(mu, mu, mu), Elliptic(mu, mu, mu)):
+        at = Chain(), law, *instants(9, 40), 1e-6
+        solved = solve_balance(*at).require()
+        motion, slopes = motion_and_derivatives(*at, solved)
+        found.append((motion.z, motion.power, slopes))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_sliding_straight_the_elliptic_law_is_coulomb_friction():
@@ -259,12 +209,8 @@ def test_sliding_straight_the_elliptic_law_is_coulomb_friction():
 )
 def test_smooth_bodies_obey_any_law_whatever_solver_they_are_asked_by(law):
     body, rng = ModalBody(), np.random.default_rng(14)
-    at = (
-        law,
-        0.3 * rng.normal(size=(body.n_joint, 2)),
-        5.0 * rng.normal(size=(body.n_joint, 2)),
-        0.1,
-    )
+    angles, rates = np.array([[[0.3]], [[5.0]]]) * rng.normal(size=(2, body.n_joint, 2))
+    at = law, angles, rates, 0.1
     solved = body.motion(*at, body.solve(*at).require())
     replayed = accurate_motion(body, *at, None)[0]
     # fixed panels resolve an instant like these to some 1e-3, whatever the law
@@ -291,11 +237,8 @@ def test_coulomb_friction_costs_what_it_did_and_keeps_its_digits(monkeypatch):
         monkeypatch.delattr(Friction, "density")
         compiled = body.solve(law, angles, rates, 1e-4).require()
         np.testing.assert_allclose(compiled.z, expected, rtol=1e-12)
-        assert motion_and_derivatives(body, law, angles, rates, 1e-4, compiled)[1].shape == (
-            6,
-            4,
-            2,
-        )
+        slopes = motion_and_derivatives(body, law, angles, rates, 1e-4, compiled)[1]
+        assert slopes.shape == (6, 4, 2)
 
 
 def test_viscous_motion_is_linear_in_the_rates():

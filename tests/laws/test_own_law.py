@@ -1,5 +1,4 @@
-"""A law stated as formulas: read, differentiated, checked for what the solvers rely on, and refused
-where that fails."""
+"""A law stated as formulas: read, differentiated, and checked for what solvers rely on."""
 
 import pickle
 

@@ -1,5 +1,4 @@
-"""Purcell's swimmer, the body whose pace matters: strokes against an independent integration, and a
-certified optimum."""
+"""Purcell's swimmer, whose pace matters: against another integration, and certified."""
 
 from pathlib import Path
 

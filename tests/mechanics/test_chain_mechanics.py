@@ -1,5 +1,4 @@
-"""Chains that lie or stand: force, balance, motion and derivatives, against points, differences,
-NumPy and CasADi."""
+"""Chains that lie or stand, against points, differences, NumPy and CasADi."""
 
 import casadi as ca
 import numpy as np

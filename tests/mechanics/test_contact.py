@@ -1,5 +1,4 @@
-"""Admissible shapes of lines and of strips: smooth bounds against plain segment intersection and
-against points of the links."""
+"""Admissible shapes of lines and strips: smooth bounds against segments and points."""
 
 from dataclasses import replace
 
@@ -99,8 +98,7 @@ def test_the_tangent_planes_of_the_minimum_lie_above_it_and_touch():
 
 
 def corner_peak(gait):
-    """The check at the corner, the instant of its peak, and the peak's height, on a mesh of 40
-    intervals."""
+    """The check at the corner, and the instant and height of its peak, on 40 intervals."""
     problem = Problem(name="corner", guess=AROUND_THE_CORNER)
     check = next(c for c in shape_checks(problem.body) if c.name.endswith("(left)"))
     times = near_peaks(gait, control_problem(problem).mesh(), [check], np.pi)[0][1]
@@ -136,8 +134,7 @@ def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_and_after(order):
-    """The head of three equal links goes through the first one; it is (sin a + sin(a + b))/3 beside
-    its line."""
+    """The head of three equal links is (sin a + sin(a + b))/3 beside the first one's line."""
     steps = np.array([-0.2, -0.1, -0.05, 0.02, 0.1, 0.2])[::order]
     angles = np.stack([np.full(6, 2.0), 2 * np.pi - 4.0 + steps])
     height = np.abs(np.sin(2.0) + np.sin(angles.sum(axis=0))) / 3
@@ -149,8 +146,7 @@ def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_an
 
 @pytest.mark.parametrize("width", [0.0, 0.02])
 def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
-    """By signs of areas, for one shape at a time, and all pairs that are three links apart at
-    least."""
+    """By signs of areas, for all pairs that are three links apart at least."""
     body = Chain((0.05, 0.2, 0.1, 0.15, 0.2, 0.1, 0.2), width=width)
     rng, found = np.random.default_rng(5), 0
     for angles in rng.uniform(-2.8, 2.8, (300, 6, 1)):

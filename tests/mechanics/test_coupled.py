@@ -1,5 +1,4 @@
-"""Chains with fewer motors than joints: against chains without those joints, and against the chain
-itself."""
+"""Chains with fewer motors than joints, against chains without those joints."""
 
 import numpy as np
 import pytest
@@ -95,8 +94,7 @@ def test_limits_are_those_of_the_joints_that_move():
 
 
 def test_torque_and_power_are_those_of_the_motors(broken):
-    """A motor that turns several joints does the work of all of them; with its share of each
-    joint's torque."""
+    """A motor that turns several joints does the work of all, with its share of each torque."""
     torques = np.random.default_rng(2).normal(size=(4, 10))
     joints, motors = JointMap(GEARS, (0.0,) * 4), np.random.default_rng(3).normal(size=(2, 10))
     powers = joints.motor_moments(torques) * motors

@@ -29,8 +29,7 @@ def test_fixed_point_and_newton_agree(delta):
 
 
 def test_a_start_next_to_the_answer_does_not_lose_it():
-    """One joint moves 4e-5 times as fast as the other. From here the anchor goes to a link from
-    which nothing converges."""
+    """One joint moves 4e-5 times as fast as the other: from a wrong anchor nothing converges."""
     angles = np.array([[-2.450491783538704], [3.0288778624868327]])
     rates = np.array([[-11.194977583218439], [4.929179798711658e-04]])
     start = np.array([[6.882907034601281e-04], [-3.7304329219234784], [11.192336543699575]])

@@ -1,5 +1,4 @@
-"""Feet, wheels and pads: the lines and points that they tend to, their directions and shares of
-weight, and what no body can have."""
+"""Feet, wheels and pads: the lines and points that they tend to, and their directions."""
 
 import numpy as np
 import pytest

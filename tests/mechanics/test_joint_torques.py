@@ -1,5 +1,4 @@
-"""What joints have to do, and the limits of what they can: idling, braking, and torques of either
-sign."""
+"""What joints have to do and can do: idling, braking, torques of either sign."""
 
 import numpy as np
 import pytest
@@ -21,8 +20,7 @@ BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, 
     ids=str,
 )
 def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
-    """So the driven power is smooth there: half of it is gained with every bit of power, whichever
-    way."""
+    """So the driven power is smooth there: half of any power is gained, whichever way."""
     (angles, rates), delta = random_instants(20), 1e-2
     idle = law.largest * delta ** (1 + law.degree)
     forces = BODY.forces(law, angles, rates, np.zeros((3, 20)), delta)
@@ -42,8 +40,7 @@ def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
 
 
 def test_torques_are_limited_both_ways_and_powers_one_way():
-    """In the program's bounds, and in what a replay tells: a gait in a mirror needs the same
-    torques the other way round."""
+    """In the program's bounds and in a replay: a gait in a mirror needs the same torques."""
     np.testing.assert_array_equal(ONE.least, [-1.0, -1.0, -np.inf, -np.inf])
     program = program_of(
         Problem("limited", gait=Harmonic(1), torque_limit=0.1, power_limit=0.5, intervals=6)

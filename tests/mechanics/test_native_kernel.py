@@ -1,5 +1,4 @@
-"""The compiled kernel: the same bits on any number of threads and in any batch; whatever is wrong
-with it costs speed only."""
+"""The compiled kernel: the same bits on any threads and in any batch; faults cost speed only."""
 
 import shutil
 import subprocess

@@ -1,5 +1,4 @@
-"""All balanced velocities at an instant: one for equal coefficients, several for some instants of
-others."""
+"""All balanced velocities: one for equal coefficients, at some instants several for others."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,4 @@
-"""Links of different weights and masses: friction follows the weight, inertia and the centre of mass
-follow the mass."""
+"""Weights and masses of links: friction follows the former, inertia and centre the latter."""
 
 import numpy as np
 import pytest
@@ -46,8 +45,7 @@ def test_a_nearly_weightless_head_neither_holds_nor_moves_the_body():
 def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_themselves_or_turn_about_an_end(
     mu,
 ):
-    """A straight body that slides as a whole, forwards, backwards and sideways; couples by a turn
-    about a link's own end."""
+    """A straight body that slides along or across; a turn about a link's own end."""
     body, law, straight = Chain(LENGTHS, weights=WEIGHTS), coulomb(*mu), np.zeros((2, 3))
     most = body.contact.largest_forces(law).ravel()
     along, across, couples = np.split(most, 3)
@@ -121,8 +119,7 @@ def test_kinetic_energy_weighs_every_link_by_its_mass(seed):
 
 
 def test_what_joints_do_beyond_friction_is_the_growth_of_kinetic_energy():
-    """From the start of a period to any phase of it: work of the joints = work against friction +
-    Fr times what E grows by."""
+    """Up to any phase, work of joints = work against friction + Fr times the growth of E."""
     froude, body = 0.3, Chain(LENGTHS, masses=MASSES, inertias=INERTIAS)
     at = {"friction": Friction(mu_t=2), "gait": Harmonic(1), "froude": froude, "delta": 1e-2}
     problem = Problem("heavy_tail", body=body, **at)

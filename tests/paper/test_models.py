@@ -1,5 +1,4 @@
-"""The paper's models: sweeps over ellipse gaits and which of these are admissible, and smooth bodies
-in the lab."""
+"""The paper's models: ellipse gaits, admissible ones, and smooth bodies in the lab."""
 
 import numpy as np
 import pytest

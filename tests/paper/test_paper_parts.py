@@ -74,8 +74,7 @@ def test_dips_of_the_third_slowest_end():
 
 
 def test_command_line_computes_resumes_and_draws(tmp_path, capsys):
-    """Two small parts: computed, then skipped; table and figures written; the rest named as
-    missing."""
+    """Two small parts: computed, then skipped, drawn; the rest named as missing."""
     arguments = ["--quick", "--only", "instant", "flap", "--processes", "1"]
     arguments += ["--output", str(tmp_path)]
     assert reproduce_paper.main(arguments) == 0

@@ -42,8 +42,7 @@ def test_held_links_creep_at_order_delta_and_bear_part_of_the_friction(case):
 
 @pytest.mark.parametrize("case", SYMMETRIC_CASES, ids=lambda c: c.name)
 def test_symmetric_cases_have_no_kinetic_solution(case):
-    """The unbalanced force falls with the one velocity that symmetry leaves free, and jumps over
-    zero at rest."""
+    """The unbalanced force falls with the velocity, and jumps over zero at rest."""
     gap = kinetic_gap(case)
     assert gap.no_solution
     V = np.concatenate([-np.geomspace(1, 1e-8, 60), np.geomspace(1e-8, 1, 60)])
@@ -101,8 +100,7 @@ class TestFlapBody:
         assert velocity.vn[0, 0] == pytest.approx(-0.2 + 0.4 * 0.7)
 
     def test_kinetic_friction_has_no_solution(self):
-        """The force falls strictly with the velocity (the dissipation is convex) and leaps over
-        zero at rest."""
+        """As the dissipation is convex it falls strictly, and leaps over zero at rest."""
         V = np.concatenate([-np.geomspace(3, 1e-8, 100), [0.0], np.geomspace(1e-8, 3, 100)])
         for opening in (0.1, 0.7, 1.4):
             assert flap_gap(self.body, opening).no_solution

@@ -31,8 +31,7 @@ def test_two_more_faces_are_needed_where_friction_backwards_is_another():
 
 
 def test_kink_where_a_joint_rests():
-    """A joint at rest, the other bent sharply: two links rest, and the velocity has a kink on ratio
-    = 0, kept on nodes."""
+    """Two links rest beside a joint at rest, and the velocity has a kink there."""
     angles = np.array([[0.75 * np.pi], [0.0]])
 
     def omega(ratio: float) -> float:

@@ -1,5 +1,4 @@
-"""Animations: pictures that move with the body, files others can play, and a clear word where
-ffmpeg is missing."""
+"""Animations: pictures that move with the body, and files others can play."""
 
 import shutil
 import subprocess

@@ -1,5 +1,4 @@
-"""The figure of a solution can be read: no words over words, nothing cut off, snapshots apart, and
-PDF only on demand."""
+"""The figure of a solution can be read: no words over words, nothing cut off."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -32,8 +31,7 @@ def crawler(n_link, size=0.6):
 
 
 def snake(size):
-    """A wave down five links that hardly slide sideways; a large one is two fifths of a body length
-    a period."""
+    """A wave down five links that hardly slide sideways."""
     phase = 0.4 * np.pi * np.arange(4.0)[:, None]
     wave = Fourier(np.zeros(4), size * np.cos(phase), size * np.sin(phase))
     friction = Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0)
@@ -159,8 +157,7 @@ def test_snapshots_never_touch_and_are_the_body_in_the_lab_with_its_centre_moved
 
 
 def test_forbidden_shapes_are_the_exact_set_of_the_three_link_body():
-    """Design: crossing iff both angles positive and min(2 a + b, a + 2 b) > 2 pi, or the mirror
-    image."""
+    """Crossing iff min(2 a + b, a + 2 b) > 2 pi with both positive, or mirrored."""
 
     def area(limit):
         return float((forbidden(Chain(), limit)[1][:-1, :-1] > 0).mean()) * (2 * np.pi) ** 2

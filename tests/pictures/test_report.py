@@ -1,5 +1,4 @@
-"""The report is one self-contained, well-formed page that trusts nothing in the file, and a browser
-runs it without a word."""
+"""The report is one self-contained page that trusts nothing in the file."""
 
 import json
 import re
@@ -12,7 +11,6 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from colloc.commands.results import report as main
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
@@ -24,7 +22,6 @@ from colloc.pictures.report_page import report_page
 from colloc.results.checks import Check
 from colloc.results.motion import lab_outline
 from colloc.results.solution import Solution
-from colloc.results.store import save
 from colloc.search.certify import certify
 from colloc.search.evaluate import evaluate
 
@@ -242,17 +239,8 @@ def test_the_browser_draws_every_period_where_the_body_is_then(turning, tmp_path
     np.testing.assert_allclose(pixels, fitted, atol=1.0)
 
 
-def test_the_command_writes_the_page_beside_the_result(three_link, tmp_path, capsys):
-    file = save(three_link, tmp_path / "x.h5")
-    assert main([str(file)]) == 0
-    assert "self-contained" in capsys.readouterr().out
-    outline((tmp_path / "x.html").read_text(encoding="utf-8"))
-    assert main([str(tmp_path / "none.h5")]) == 2
-
-
 def browsed(page, folder):
-    """What a browser makes of a page: its document as standard output, its complaints as standard
-    error."""
+    """A browser's document of a page as standard output, its complaints as errors."""
     file = folder / "page.html"
     file.write_text(page, encoding="utf-8")
     options = (

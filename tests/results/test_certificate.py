@@ -46,8 +46,7 @@ def replays(three_link):
 
 @pytest.fixture
 def failures(three_link, replays, monkeypatch):
-    """A function from a changed solution and changes of its replays to the names of the checks that
-    fail."""
+    """From a changed solution and changes of its replays to the checks that fail."""
 
     def names(solution=three_link, change=lambda part, replayed: replayed):
         largest = max(replays)
@@ -70,8 +69,7 @@ def changed(replayed, **numbers):
 
 
 def judged(name, run):
-    """`run` of a factor makes a violation of so many times the limit: only `name` fails, and only
-    above it."""
+    """At so many times its limit `name` fails, only above it and nothing else."""
     assert run(JUST_BELOW) == set()
     assert run(JUST_ABOVE) == {name}
 
@@ -156,8 +154,7 @@ def test_joint_limits_are_those_of_the_problem(failures, three_link):
 def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(
     failures, three_link, replays
 ):
-    """The replay's distance counts: a problem that asks for as much has it, and one that asks for
-    more does not."""
+    """The replay's distance counts: who asks for as much has it, who asks for more has not."""
     there = replays[max(replays)].distance
 
     def run(f):
@@ -227,8 +224,7 @@ LONG = [pytest.param(name, marks=pytest.mark.slow) for name in ("four_link", "fi
 
 @pytest.mark.parametrize("name", ["two_link", "three_link", "small_gaits", *LONG])
 def test_errors_of_a_certificate_hold(solved, name):
-    """Efficiency at delta, and for delta -> 0, against replays to 1e-9 at delta and at a
-    ten-thousandth of it."""
+    """Against replays to 1e-9 at delta and at a ten-thousandth of it."""
     solution = solved(name)[0]
     known, at = solution.certificate, (solution.problem.body, solution.problem.friction)
     deltas = solution.delta_per_period * np.array([1.0, 1e-4])
@@ -257,8 +253,7 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly():
 def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(
     failures, three_link, replays, monkeypatch
 ):
-    """1 % of the efficiency that the law leaves open may pass; it is no fault of the mesh, and
-    stated in every error."""
+    """Up to 1 % that the law leaves open may pass, stated in every error."""
     fine = replays[max(replays)]
 
     def open_by(part):
@@ -275,8 +270,7 @@ def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(
 
 
 def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):
-    """Curvature in units of the objective, less its error, as the mesh may be wrong by what a tenth
-    of a radian gains."""
+    """Curvature over the objective, less its error; a tenth of a radian gains that much."""
 
     def curved(smallest, error, n_free=2):
         return with_answer(three_link, second_order=SecondOrder(smallest, error, n_free))
@@ -299,8 +293,7 @@ def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):
 
 @pytest.mark.parametrize("image", ["mirrored", "back in time", "from the other end"])
 def test_no_check_knows_left_from_right_or_one_sense_from_the_other(image):
-    """Where friction does not either, and the body is alike from both ends: an image of a gait has
-    its certificate, its fastest joint and its hardest motor, whatever way they turn."""
+    """Nor friction nor the body does: an image of a gait has its certificate."""
     gait = Fourier([0.3, 0.4], [[0.0, 0.0], [0.5, 0.0]], [[0.6, -0.2], [0.0, 0.1]])
     rates = gait.rates(np.arange(1000) / 1000)
     assert rates.max() < 0.9 * -rates.min()  # what this gait is here for

@@ -1,5 +1,4 @@
-"""A result takes its place without loss: what another problem, or a better answer, left there is
-kept and named."""
+"""A result takes its place without loss: what was there and is better, or another, is kept."""
 
 import os
 import re

@@ -70,8 +70,7 @@ def test_work_over_a_period_is_the_mean_power_and_moves_the_body_its_way(three_l
 
 
 def test_how_numbers_grow_with_size_mass_gravity_and_pace(three_link, robot):
-    """Friction is proportional to the weight, torques to the length too; at one Froude number the
-    pace is in speeds and powers alone."""
+    """At one Froude number the pace is in speeds and powers alone."""
     other = three_link.robot(length=2.4, mass=6, period=10, gravity=9.81 / 2).facts
     growth = {"work_per_period_J": 2, "mean_power_W": 1, "speed_m_per_s": 1, "froude_number": 1}
     growth |= {"peak_torque_N_m": 2, "rms_speed_rad_per_s": 0.5}
@@ -93,8 +92,7 @@ def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(thr
 
 
 def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
-    """As of the same gait in a problem for that pace, whose motion is collocated, and of one
-    followed through time."""
+    """As of the same gait collocated for that pace, and of one followed through time."""
     size = {"length": 1.0, "mass": 2.0, "period": 1.5}
     robot = three_link.robot(**size)
     paced = {"froude": robot.froude, "gait": Harmonic(1), "delta": 1e-3, "mesh_tolerance": 1e-3}
@@ -262,8 +260,7 @@ def test_a_gait_goes_the_way_it_is_asked_to_on_a_slope_and_its_distance_is_that_
 
 
 def test_gravity_of_an_exported_model_leans_downhill_as_seen_from_its_tail(towards_left, tmp_path):
-    """Its size is that on earth, its part across the ground the grade; the tail link lies along
-    +x."""
+    """Its part across the ground is the grade; the tail link lies along +x."""
     model = tmp_path / "model.xml"
     towards_left.export(model, length=LENGTH, mass=MASS, period=20.0)
     stated = ElementTree.parse(model).find("option").get("gravity")

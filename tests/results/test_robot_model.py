@@ -18,8 +18,7 @@ UNEVEN, MASSES, INERTIAS = (0.2, 0.5, 0.3), (0.3, 0.2, 0.5), (0.002, 0.006, 0.00
 
 @pytest.fixture(scope="module")
 def uneven(unsolved):
-    """Links of their own lengths, weights, masses and moments of inertia, ranges to one side, and
-    feet."""
+    """Own lengths, weights, masses, inertias and feet; ranges to one side."""
     pair = (Foot(2, 0.7, offset=side * 0.02, weight=0.15) for side in (1, -1))
     feet = Foot(0, 0.2, weight=0.2), Foot(1, weight=0.5), *pair
     body = Chain(UNEVEN, weights=UNEVEN, feet=feet, masses=MASSES, inertias=INERTIAS)

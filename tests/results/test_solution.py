@@ -41,8 +41,7 @@ def test_a_deliberately_poor_guess_reaches_the_paper_s_optimum(three_link):
 
 
 def test_a_gait_that_is_named_from_the_other_end_travels_the_other_end_first():
-    """Each joint takes the part of its mirror image, and the angles their opposite: the same motion
-    of equal links."""
+    """Each joint takes the part of its mirror image, with the opposite angle."""
     gait = Fourier([0.0, 0.2], [[1.4], [0.9]], [[0.2], [1.1]])
     turned = Fourier(-gait.mean[::-1], -gait.cos[::-1], -gait.sin[::-1])
     back = Fourier(gait.mean, gait.cos, -gait.sin)

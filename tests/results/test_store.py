@@ -29,8 +29,7 @@ def test_round_trip_keeps_everything(three_link, tmp_path):
 def test_an_answer_met_among_gaits_larger_than_the_problems_own_guess_is_read_back(
     three_link, tmp_path
 ):
-    """Four links on feet: the search goes on among gaits as fast as a finite one, and the usual
-    first guess is slower."""
+    """The search may go on among gaits that are faster than the usual first guess."""
     gait = three_link.gait
     larger = three_link.answer.problem.with_(smallest_shape_speed=gait.shape_speed, guess=gait)
     answer = dataclasses.replace(three_link.answer, problem=larger)

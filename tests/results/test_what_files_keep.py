@@ -24,8 +24,7 @@ def quick(once):
 def test_a_result_to_which_somebody_added_something_is_not_lost_when_the_problem_is_solved_again(
     place, quick, tmp_path
 ):
-    """A remark, or measured data. Numbers of its own that were changed by hand are not: `colloc
-    verify` finds those."""
+    """A remark, or measured data; changed numbers of its own are found by `colloc verify`."""
     path = tmp_path / "quick.h5"
     for again in (save_result(quick, path), save_result(quick, path)):
         assert again[0].former is None

@@ -1,5 +1,4 @@
-"""Compiled code under the address sanitizer, which ends a process at the first word beside an
-array."""
+"""Compiled code under the address sanitizer."""
 
 import os
 import subprocess

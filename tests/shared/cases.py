@@ -4,8 +4,7 @@ import colloc
 
 
 def cases(text, names):
-    """Dictionary of the lines 'name: field=value, …' of a text, read with the public names of
-    colloc and the given names."""
+    """Of the lines 'name: field=value, …', with the names of colloc and the given ones."""
     names = {name: getattr(colloc, name) for name in colloc.__all__} | names
     lines = (line.split(": ", 1) for line in text.strip().splitlines())
     return {name: eval(f"dict({fields})", names) for name, fields in lines}

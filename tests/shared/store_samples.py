@@ -1,5 +1,4 @@
-"""A small file of every kind that colloc writes, with its reader and a writer; for tests of faults
-and of damage."""
+"""A small file of every kind that colloc writes, with its reader and a writer."""
 
 from pathlib import Path
 

@@ -1,5 +1,4 @@
-"""A program in a terminal: what it writes to a pseudo-terminal, and what stands on the screen
-then."""
+"""What a program writes to a pseudo-terminal, and what stands on the screen then."""
 
 import contextlib
 import os
@@ -11,8 +10,7 @@ _SIZE = (24, 100)
 
 
 def run_in_terminal(words, folder, **environment):
-    """Exit code of a program and all that it wrote, run to its end with a terminal as its standard
-    streams."""
+    """Exit code and all that is written, with a terminal as the standard streams."""
     import pty
     import termios
 
@@ -35,8 +33,7 @@ def run_in_terminal(words, folder, **environment):
 
 
 def screen(written):
-    """The lines that a terminal shows in the end, as far as the codes go that the commands use;
-    whether the cursor is seen."""
+    """Lines on the screen in the end, as far as the used codes go; is the cursor seen?"""
     lines, row, column, seen = [""], 0, 0, True
     for code in _CODE.finditer(written):
         text, (number, letter) = code[0], code.groups()

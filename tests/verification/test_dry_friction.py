@@ -1,5 +1,4 @@
-"""Motion at delta = 0, between bounds: against cone programs by another solver, against small
-delta, and by what must hold."""
+"""Motion at delta = 0, between bounds: against cone programs and against small delta."""
 
 import clarabel
 import numpy as np
@@ -121,8 +120,7 @@ def test_verify_tells_the_interval_on_demand(three_link, tmp_path, capsys):
 
 
 def test_where_either_foot_may_hold_the_motion_is_bounded_only_loosely():
-    """One joint between two single feet: either may rest and the other move, or both move, with the
-    same dissipation."""
+    """Of two single feet either may rest, or both move, with the same dissipation."""
     found = dry_balance(Chain((0.5, 0.5), feet=1), ISOTROPIC, np.array([[0.8]]), np.array([[1.0]]))
     assert found.most - found.least < 1e-8
     assert found.apart.max() > 1e-2
@@ -135,8 +133,7 @@ def test_where_either_foot_may_hold_the_motion_is_bounded_only_loosely():
 def test_of_three_feet_in_a_row_any_two_may_rest_and_the_bounds_hold_all_these_motions(
     lengths, places, rates
 ):
-    """Where each bears as much as makes it cost the same whichever of them moves: the middle one
-    half."""
+    """Each bears as much as makes either motion cost the same: the middle one half."""
     masses, hinges = (0.5, 0.2, 0.3), np.array([0.0, lengths[0], lengths[0] + lengths[1]])
     at = hinges + np.array(places) * lengths
     middle = np.dot(masses, hinges + 0.5 * np.array(lengths))

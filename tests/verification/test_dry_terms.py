@@ -1,5 +1,4 @@
-"""Each part of the interval for dry friction widens it by as much as that part is off, and none is
-left out."""
+"""Each part of the interval for dry friction widens it by as much as that part is off."""
 
 from dataclasses import replace
 
@@ -17,8 +16,7 @@ OFF = 1e-3
 
 @pytest.fixture
 def interval(monkeypatch):
-    """A function to the interval, were dry friction known exactly, to be what the replay has, but
-    for what is added to one of its fields."""
+    """The interval if dry friction were the replay's, but for what is added to a field."""
 
     def bounds(name="", added=lambda n: 0.0):
         def known(body, law, angles, rates):
@@ -68,8 +66,7 @@ def test_what_the_quadrature_is_off_by_counts_once_to_each_side(monkeypatch, int
 def test_a_velocity_that_is_off_or_open_leads_as_far_as_it_carries_in_a_period(
     interval, what, row, every
 ):
-    """Between two instants the worse of them counts: where every other is off, all of the
-    period."""
+    """Between two instants the worse counts: with every other off, all of the period."""
     exact, found = widths(interval()), widths(interval(what, shifted(row, every)))
     assert found[0] - exact[0] == pytest.approx(2 * OFF, rel=1e-3)
     assert found[1] == pytest.approx(exact[1])

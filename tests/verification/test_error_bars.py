@@ -1,5 +1,4 @@
-"""Stated errors against a program of nothing that colloc has, and with inertia and on slopes; the
-program that judges certificates notices what is false."""
+"""Stated errors against a program that has nothing of colloc; false statements are noticed."""
 
 import json
 

@@ -22,14 +22,12 @@ ISOTROPIC, ANISOTROPIC = colloc.Friction(), colloc.Friction(mu_t=1.7, mu_f=1.0, 
 
 
 def newtons_law(body, law, gait, delta, froude, steps=400, periods=3):
-    """Distance, work and rotation of the last period by Newton's law, the forces on dense points,
-    and Runge and Kutta's method."""
+    """Distance, work and rotation of the last period: dense points, Runge and Kutta's method."""
     mass, lengths = body.mass_column()[:, 0], np.array(body.lengths)
     own = np.array(body.inertias) if body.inertias else mass * lengths**2 / 12
 
     def changes(t, state):
-        """Of orientation, place and velocity of the centre of mass in the plane, angular momentum,
-        work."""
+        """Of orientation, place and velocity of the centre, angular momentum and work."""
         turn, velocity, angular = np.exp(1j * state[0].real), state[2], state[3].real
         angles, rates = (each[:, 0] for each in gait(np.array([t % 1.0])))
         spin, half = np.cumsum([0.0, *rates]), 0.5 * lengths * np.exp(1j * np.cumsum([0, *angles]))
@@ -80,8 +78,7 @@ def test_newtons_law_for_dense_points_says_the_same(body, friction, gait):
 
 
 def test_without_friction_momentum_is_conserved():
-    """A free body that is not pushed keeps its velocity in the plane and its angular momentum,
-    however its joints move."""
+    """A free body keeps its velocity and angular momentum, however its joints move."""
     angles, rates = LEANING(np.array([0.3]))
     states = np.array([[0.2], [-0.4], [0.05]])
     law = colloc.Friction(1e-12, 1e-12, 1e-12)
@@ -92,8 +89,7 @@ def test_without_friction_momentum_is_conserved():
 
 @pytest.mark.parametrize("mu", [0.02, 0.01])
 def test_errors_that_are_stated_are_no_smaller_where_friction_hardly_brakes(mu):
-    """A period leaves nearly all of a change of the momenta, so a small gap at its end is a motion
-    far off."""
+    """A period leaves nearly all of a change of momenta: a small gap is a motion far off."""
     at = CHAIN, colloc.Friction(mu, mu, mu), LEANING, 1e-3, 1.0
     rough, fine = (colloc.inertial_motion(*at, tolerance=tolerance) for tolerance in (1e-4, 1e-6))
     assert np.abs(rough.multipliers).max() > 0.96
@@ -101,8 +97,7 @@ def test_errors_that_are_stated_are_no_smaller_where_friction_hardly_brakes(mu):
 
 
 def test_a_period_that_does_not_close_is_off_by_no_more_than_is_stated():
-    """However small its steps are: what is left open leads away from the motion in which all
-    periods are alike."""
+    """However small its steps are: a gap leads away from the motion of equal periods."""
     gait = GaitWithInertia(CHAIN, colloc.Friction(0.1, 0.1, 0.1), LEANING, 1e-2, froude=1.0)
     closed = gait.find_period()
     exact = gait.periodic_run(closed.momenta, 1e-6, closed.slopes)
@@ -134,8 +129,7 @@ def test_slow_motion_is_the_limit():
 
 @pytest.mark.slow
 def test_corners_are_passed_where_they_are():
-    """A gait of straight lines between corners, against steps that know nothing of these but are
-    small."""
+    """Against steps that know nothing of them but are small."""
     gait = colloc.Corners(np.array([[0.0, 1.5, 0.4], [0.0, 0.2, 1.4]]))
     exact = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1, breaks=gait.corner_phases)
     blind = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1)
@@ -231,8 +225,7 @@ def test_on_the_level_it_does_not_matter_where_a_body_points_at_first():
 
 
 def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_friction_is():
-    """Steps that err by more than delta shake a body that should rest, and there is no end to
-    them."""
+    """Steps that err by more than delta would shake a body that should rest, without end."""
     asked, standing = [], colloc.Chain((0.3, 0.45, 0.25), feet=1)
 
     def path(t):

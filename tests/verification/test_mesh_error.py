@@ -109,8 +109,7 @@ def test_shares_of_intervals_add_up_to_the_error_of_other_objectives(objective):
 
 
 def test_shares_of_intervals_add_up_where_the_body_turns_in_half_a_period():
-    """Antipodal gaits turn back in the other half: what counts is the displacement half way between
-    both headings."""
+    """What counts is the displacement half way between the headings of both halves."""
     gait = Fourier(np.zeros(2), np.array([[1.5], [-1.0]]), np.array([[0.3], [1.0]]))
     stated = problem("trapezoid", gait=Harmonic(1, "antipodal"), intervals=40)
     assert abs(fine_of(stated, gait=gait).theta[-1]) > 0.1
@@ -158,8 +157,7 @@ def test_a_kink_is_found_where_the_body_comes_to_rest():
 
 @pytest.mark.parametrize(("least", "counts"), [(2.0, True), (5.0, False)])
 def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts):
-    """One joint that slows down to a rate at which some point of the links moves at 17 delta, or at
-    43."""
+    """One joint slows down until some point of the links moves at 17 delta, or at 43."""
     body, friction, delta = Chain((0.4, 0.6)), Friction(), 1e-3
 
     def slowing(t):
@@ -187,8 +185,7 @@ def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts
 def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards(
     rule, friction, held, monkeypatch
 ):
-    """Schemes with nodes at the ends of an interval would have one there, and the efficiency a kink
-    in the gait."""
+    """Schemes with nodes at ends of intervals would give the efficiency a kink there."""
     stated, kink = problem(friction=friction, scheme=rule, intervals=8), 0.1234
     monkeypatch.setattr(refinement, "kink_phases", lambda *arguments: np.array([kink]))
     plan = planned(stated, tolerance=1e-4)

@@ -46,8 +46,7 @@ def random_path(seed):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_stated_error_holds_against_another_quadrature(seed):
-    """Against Gauss nodes on adaptive panels, from grids of any size: their kinks lie anywhere
-    between the instants."""
+    """Against Gauss nodes on adaptive panels, from grids with kinks between the instants."""
     body, friction, path = random_path(seed)
     fine = fine_motion(body, friction, path, 1e-4, np.linspace(0, 1, 21), 1e-9)
     exact = abs(fine.path[-1]) / fine.totals[0, -1]
@@ -83,8 +82,7 @@ def test_panels_gather_at_kinks():
 
 
 def test_the_largest_residual_of_all_instants_is_reported(monkeypatch):
-    """Between breaks the replay runs in pieces; an instant out of balance counts in whichever of
-    them it is."""
+    """An instant out of balance counts in whichever piece between breaks it is."""
     body, friction, path = random_path(1)
     exact = Chain.solve
     for where in (0.1, 0.5, 0.9):
@@ -106,8 +104,7 @@ def test_an_accuracy_beyond_that_of_the_balance_is_not_claimed():
 
 
 def test_another_followed_point_changes_the_distance_by_at_most_rotation_times_lever():
-    """The ends of the body against its centre of mass, for gaits that turn: first order in the
-    rotation."""
+    """The ends of the body against its centre: first order in the rotation."""
     for seed in range(4):
         body, friction, path = random_path(seed)
         result = replay(body, friction, path, 1e-4, tolerance=1e-4)

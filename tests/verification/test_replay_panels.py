@@ -1,5 +1,4 @@
-"""What halving panels says of the error: at kinks that lie anywhere, across corners, and in the
-distance."""
+"""What halving panels says of the error: at kinks anywhere, corners, in the distance."""
 
 import json
 
@@ -55,8 +54,7 @@ def slipping_through_rest(x):
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 0.8, 1.0])
 def test_stated_errors_cover_a_kink_wherever_it_lies(share):
-    """At many places the change of its panel is small by accident; to count on that made one error
-    in five too small."""
+    """At many places the change of its panel is small by accident."""
     true, stated = [], []
     for at in np.random.default_rng(0).uniform(0.3, 0.7, 200):
 
@@ -73,8 +71,7 @@ def test_stated_errors_cover_a_kink_wherever_it_lies(share):
 
 
 def test_corners_are_not_taken_for_kinks():
-    """On both sides of a jump the power is linear: nothing is left, though the instants beside it
-    do not fit."""
+    """Beside a jump the power is linear: nothing is left, though the instants do not fit."""
     assert stated_work(panels_of(lambda t: np.where(t < 0.5, 1 + t, 3 - t), corner=0.5)) < 1e-14
     kept_in_view = panels_of(lambda t: np.where(t < 0.51, 1 + t, 3 - t))
     assert stated_work(kept_in_view) > 1e-3
@@ -82,8 +79,7 @@ def test_corners_are_not_taken_for_kinks():
 
 @pytest.mark.parametrize("steady", [False, True])
 def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
-    """The rest of the path turns with the panel, which is all that changes where a panel goes
-    straight on at one speed."""
+    """The rest of the path turns with the panel, all that changes where that is steady."""
     rng, n = np.random.default_rng(3), 8
     spin, centre = 1e-3 * rng.normal(size=(n, 5)), rng.normal(size=(n, 5, 2)) @ np.array([1, 1j])
     centre[:] = centre[:, :1] if steady else centre
@@ -114,8 +110,7 @@ OPTIMA = {
 
 @pytest.mark.parametrize("number", [35, 94, 162, 209, 558, 893])
 def test_stated_errors_cover_optimised_gaits(number):
-    """Their kinks repeat by symmetry, at the same place within several panels: accidents do not
-    average out."""
+    """Their kinks repeat by symmetry in several panels: accidents do not average out."""
     problem, _, _ = random_problem(number)
     row = OPTIMA[number]
     result = replay(problem.body, problem.friction, path_of(row["gait"]), row["delta"])

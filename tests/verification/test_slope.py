@@ -1,5 +1,4 @@
-"""Gaits on a slope: against a program of its own, the level, conservation of energy, and what
-symmetry demands."""
+"""Gaits on a slope: against points, the level, conservation of energy, and symmetry."""
 
 import numpy as np
 import pytest
@@ -46,8 +45,7 @@ def still(t):
     ("body", "grade"), [(LOPSIDED, 0.5), (ON_FEET, 0.25)], ids=["lying", "standing"]
 )
 def test_the_motion_is_that_of_a_program_of_its_own(body, grade):
-    """Runge and Kutta's rule on balances point by point; delta is large, so that both are smooth
-    and few steps do."""
+    """Runge and Kutta's rule on balances of points; delta is large, so few steps do."""
     delta, steps, near = 0.3, 20, np.zeros(3)
     ours = slope_motion(body, UNEQUAL, SKEW, delta, grade, heading=1.0)
 
@@ -158,8 +156,7 @@ def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
 
 
 def test_an_antipodal_gait_settles_along_the_fall_line():
-    """Of the two headings that a period does not turn, others come closer to one, and leave the
-    other."""
+    """Of two headings that a period does not turn, others approach one and leave the other."""
 
     def period(heading, periods=1):
         at = Chain(), Friction(), ANTIPODAL, 0.05, 0.1
