@@ -29,7 +29,7 @@ def motion_of(stated):
 
 
 def played(**slope):
-    regime = Regime(**slope) if slope else None
+    regime = Regime(**slope)
     return inertial_motion(BODY, FRICTION, LEANING, DELTA, 0.1, tolerance=1e-6, regime=regime)
 
 
