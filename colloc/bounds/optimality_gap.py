@@ -79,7 +79,7 @@ def gap_line(
     if bound is not None:
         return f"  {bound.report(efficiency)}"
     if not _has_bound(problem):
-        return f"  no upper bound on the {problem.objective.name} is known"
+        return f"  no upper bound on {problem.objective.name!r} is known"
     limit = 1.0 / problem.law.smallest
     tighter = "" if asked or refusal(problem) else "; --bound computes a tighter one"
     return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"

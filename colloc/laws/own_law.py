@@ -83,7 +83,7 @@ class OwnLaw:
         with np.errstate(all="ignore"):  # what is not finite is refused
             fs, fn = (np.broadcast_to(f, vs.shape) for f in self.density(vs, vn, delta))
             rest = np.abs(self.density(zero, zero, zero + _DELTAS[0])).max()
-        if not (np.isfinite(fs).all() and np.isfinite(fn).all() and not np.isnan(rest)):
+        if not np.isfinite([*fs, *fn]).all() or np.isnan(rest):
             where = "at rest (vs = vn = 0)" if np.isnan(rest) else "somewhere"
             raise ProblemError(
                 f"friction: a formula has no finite value {where}; divide by speed, which is never "
@@ -105,6 +105,8 @@ class OwnLaw:
                 "friction: the law differs between left and right (vn and -vn), which the "
                 "symmetries exclude."
             )
+        if self.smallest <= 0:
+            raise ProblemError("friction: nothing resists sliding along the body, or across it.")
         # a force that jumps has no balance where it does
         step = _STEP * delta
         for name, *sides in (
@@ -179,7 +181,7 @@ class OwnLaw:
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
         vs, vn, delta = (self.speed_unit * a for a in (vs, vn, delta + 0.0 * vs))
         at = {"vs": vs, "vn": vn, "speed": regularised_speed(vs, vn, delta), "delta": delta}
-        fs, fn = (each(at) / self.unit for each in self._read)
+        fs, fn = (each(at) / self.unit + 0.0 * vs for each in self._read)
         return fs, fn
 
     def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
@@ -194,7 +196,7 @@ class OwnLaw:
         return tuple(rows)
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        # the trace alone is nearly 0 where both components are dry on their own
+        # beside the trace, which is nearly 0 where each component is dry by itself
         (ss, _), (_, nn) = self.density_jacobian(vs, vn, delta)
         along, across = (
             regularised_speed(ss + nn, f * v / (v * v + delta * delta + _LEAST**2), _LEAST)

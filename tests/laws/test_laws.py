@@ -88,6 +88,12 @@ def test_the_secant_of_formulas_that_are_dry_in_each_direction_does_not_vanish()
         assert (secant[k][k] * v > -0.7 * force[k]).all()
 
 
+@pytest.mark.parametrize(("along", "why"), [("0", "nothing resists"), ("1", "does not oppose")])
+def test_a_formula_without_variables_is_refused_for_what_it_does(along, why):
+    with pytest.raises(ValueError, match=why):
+        OwnLaw(along, "-vn/speed")
+
+
 @each
 def test_forces_on_links_are_integrals_of_the_force_on_points(law):
     velocity = moving_links(3, 4)
