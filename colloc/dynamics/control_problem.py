@@ -21,7 +21,6 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import fraction
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimits, Quantity
-from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
@@ -133,8 +132,8 @@ def control_problem(problem: Problem) -> ControlProblem:
     gait, law, regime = problem.gait, problem.law, problem.regime
     aims, limits = problem.aims, problem.path_limits
     degrees = [part.degree for part in aims] + [limit.friction_degree for limit in limits.each]
-    # what a gait says of its pace has no unit
-    unit = 1.0 if None in degrees or regime.free else friction_unit(law)
+    # the power of ten nearest to the smallest coefficient; what a gait says of its pace has no unit
+    unit = 1.0 if None in degrees or regime.free else 10.0 ** np.rint(np.log10(law.smallest))
     if unit != 1.0:
         law, regime = law.in_units_of(unit), regime.in_units_of(unit)
     symmetry, turn = regime.motion_symmetry(gait.symmetry), problem.rotation or 0.0
@@ -161,11 +160,6 @@ def control_problem(problem: Problem) -> ControlProblem:
         problem.delta_start,
         unit,
     )  # fmt: skip
-
-
-def friction_unit(law: Law) -> float:
-    """Power of ten nearest to the smallest coefficient."""
-    return float(10.0 ** np.rint(np.log10(law.smallest)))
 
 
 def _size(aim: Objective, unit: float) -> float:

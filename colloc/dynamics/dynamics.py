@@ -199,15 +199,15 @@ class QuasiStatic:
 
     def initial_heading(self, static: np.ndarray) -> float:
         """Initial orientation; 0 where it is no state."""
-        names = [each.name for each in self.static_parameters]
-        return float(static[names.index("theta")]) if "theta" in names else 0.0
+        return float(static[-1]) if "theta" in self.states else 0.0
 
     def static_of(self, gait: Any) -> np.ndarray:
         """Static parameters that a gait states, ``(n_static,)``."""
         return np.array([getattr(gait, each.name) for each in self.static_parameters])
 
     def equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
-        return CollocatedStates(mesh, unit=unit)
+        free = np.array([name in STATES for name in self.states])
+        return CollocatedStates(mesh, free, momenta_image(self.symmetry), unit)
 
     @property
     def _grow(self) -> list[int]:
@@ -293,7 +293,8 @@ class OnSlope(QuasiStatic):
             turns = shapes.pace * z[None, OMEGA]
             return Rates(turns, shapes.pace * now.on_theta[None, None, OMEGA], balanced)
 
-        states, _, held = self.equations(mesh, shapes.unit).solve(rates, static, near_states)
+        solve = self.equations(mesh, shapes.unit).solve
+        states, _, held = solve(rates, static, near_states, monotone=True)
         slopes = now.on_shape, now.on_theta[:, None]
         return Trajectory(static, now.now, np.full(mesh.n_point, held), lambda: slopes, states)
 
@@ -374,10 +375,6 @@ class Inertial(QuasiStatic):
         if self._timed:
             found["period"] = TotalGradient(static=float(np.exp(passed.static[0])))
         return found
-
-    def equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
-        free = np.array([name in STATES for name in self.states])
-        return CollocatedStates(mesh, free, momenta_image(self.symmetry), unit)
 
     def simulate(
         self,

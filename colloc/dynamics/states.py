@@ -24,6 +24,8 @@ from colloc.numerics.mesh import Mesh
 _CLOSED, _STEPS = 1e-12, 200
 _ROUNDED = 1e-11
 """Newton step that counts as none where steep rates leave rounding."""
+_SHARES, _ASTRAY = 0.5 ** np.arange(7), 5
+"""Damping factors where the residual has to fall; steps in a row that may miss that."""
 _LEAST_SHARE = 1 / 16
 """Give up if the damping factor falls below this."""
 _FAR = np.errstate(over="ignore", invalid="ignore")
@@ -41,28 +43,28 @@ class Rates(NamedTuple):
 class CollocatedStates:
     """Equations of states on a mesh whose neighbours share no stage.
 
-    free: the states that close a period, ``(n_state,)``; the others start where they are told to.
-    image: map ``(n_state, n_state)`` from the start of the free states to their end; identity by
-    default. unit: rates are per time over this.
+    free: which states ``(n_state,)`` close a period; the others start where they are told to.
+    image: map ``(n_state, n_state)`` from their start to their end; identity by default. unit:
+    rates are per time over this.
     """
 
     def __init__(
         self,
         mesh: Mesh,
-        free: np.ndarray | None = None,
+        free: np.ndarray,
         image: np.ndarray | None = None,
         unit: float = 1.0,
     ) -> None:
         self._shape = mesh.n, mesh.scheme.s
         self._a = unit * mesh.h[:, None, None] * mesh.scheme.A
         self._b = unit * mesh.h[:, None] * mesh.scheme.b
-        self._free = np.flatnonzero(np.zeros(0, dtype=bool) if free is None else free)
-        self._image = image
+        self._free = np.flatnonzero(free)
+        self._image = np.eye(len(free)) if image is None else image
 
     @property
     def scheme(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """h A ``(n, s, s)``, h b ``(n, s)`` and the image."""
-        return self._a, self._b, np.eye(len(self._free)) if self._image is None else self._image
+        return self._a, self._b, self._image
 
     def integrals(self, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """``H r`` at the points, ``(n_state, n_point)``, and over all, ``(n_state,)``."""
@@ -76,18 +78,21 @@ class CollocatedStates:
         rates: Callable[[np.ndarray], Rates],
         start: np.ndarray,
         near: np.ndarray | None = None,
+        *,
+        monotone: bool = False,
     ) -> tuple[np.ndarray, np.ndarray, bool]:
         """States ``(n_state, n_point)``, start and convergence of Newton's method, damped as in
         NLEQ-ERR (Deuflhard, *Newton Methods for Nonlinear Problems*, 3.3): a step is accepted if
-        the next one, with the same derivatives, is shorter. Residuals may grow on the way under
-        steep friction. `start` ``(n_state,)`` is the begin (of free states a guess), `near` a guess
-        of the states."""
+        the next one, with the same derivatives, is shorter, as residuals of momenta may grow on the
+        way under steep friction; or, `monotone`, if residuals fall, where rates are not known
+        everywhere, as on slopes. `start` ``(n_state,)`` is the begin (of free states a guess),
+        `near` a guess of the states."""
         start = np.array(start, dtype=float)
         if near is None:
             near = np.repeat(start[:, None], np.prod(self._shape), axis=1)
         x = np.column_stack([near, start])
         now, residual, off = self._residual(rates, x)
-        next_step, trusted = np.zeros_like(x), np.inf
+        next_step, trusted, astray = np.zeros_like(x), np.inf, 0
         for _ in range(_STEPS):
             if off < _CLOSED or not now.known:
                 break
@@ -99,6 +104,17 @@ class CollocatedStates:
             if np.abs(step).max() < _ROUNDED:
                 off = 0.0
                 break
+            if monotone:
+                before = off
+                for share in _SHARES:
+                    trial = x - share * step
+                    now, residual, off = self._residual(rates, trial)
+                    if off < before:
+                        break
+                x, astray = trial, 0 if off < before else astray + 1
+                if astray > _ASTRAY:
+                    break
+                continue
             # derivatives are good for steps in proportion to how well they told this one
             missed = float(np.linalg.norm(next_step - step)) * size
             share = 1.0 if missed <= trusted else max(_LEAST_SHARE, trusted / missed)
@@ -167,8 +183,8 @@ class CollocatedStates:
         states, start = x[:, :-1], x[:, -1]
         now = rates(states)
         gained, whole = self.integrals(now.value)
-        end = start if self._image is None else self._image @ start
-        residual = np.column_stack([states - start[:, None] - gained, whole + (start - end)])
+        closing = whole + (start - self._image @ start)
+        residual = np.column_stack([states - start[:, None] - gained, closing])
         off = max(np.abs(residual[:, :-1]).max(), np.abs(residual[self._free, -1]).max(initial=0.0))
         return now, residual, float(off) if now.known else np.inf
 
@@ -191,8 +207,7 @@ class CollocatedStates:
 
     def _open(self, through: np.ndarray) -> np.ndarray:
         """``d s_end / d s_0 - M`` of the free states."""
-        image = np.eye(len(through)) if self._image is None else self._image
-        return (through - image)[np.ix_(self._free, self._free)]
+        return (through - self._image)[np.ix_(self._free, self._free)]
 
     def vjp(
         self, on_states: np.ndarray, of_states: np.ndarray
@@ -209,7 +224,7 @@ class CollocatedStates:
             closing = np.zeros_like(on_start)
             closing[:, free] = -np.linalg.solve(self._open(through).T, on_start[:, free].T).T
             on_start, on_rates, on_ends = within.vjp(of_states, closing)
-            on_start -= closing @ (np.eye(k) if self._image is None else self._image)
+            on_start -= closing @ self._image
         return on_start, on_rates, on_ends
 
 

@@ -110,14 +110,8 @@ class LinearSpace(SearchSpace):
         angles, rates = self.trajectory(v)(t)
         return angles, rates / np.linalg.norm(rates, axis=0) if self._relative else rates
 
-    def _acceleration_matrix(self, t: np.ndarray) -> np.ndarray:
-        return self._gaits.angle_matrix(t, self.control.admissible.n_joint, 2)
-
-    def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return (self._acceleration_matrix(t) @ self.shape(v)).T
-
     def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
-        matrix = self._acceleration_matrix(self.mesh.times)
+        matrix = self._gaits.angle_matrix(self.mesh.times, self._matrix.shape[1] // 2, 2)
         return self.shape_vjp(v, np.einsum("kjt,tjp->kp", on_points, matrix))
 
     def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:

@@ -208,10 +208,6 @@ class ActuatorRows:
             return np.empty((0, v.size))
         return self._motion.share_slopes(self._limits, v, delta, self.placed)
 
-    def every_bound(self) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds at all points, in the order of the full program's rows."""
-        return self.lower.T.ravel(), self.upper.T.ravel()
-
     def multipliers(self, on_rows: np.ndarray) -> np.ndarray:
         """Multipliers of the full program's rows, from those of these."""
         found = np.zeros(self.upper.shape)

@@ -71,7 +71,8 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
     x = program.feasible(parameters, delta)
     program = _with_whole_turns(program, x)
     if reduced.actuators is not None:
-        program = program.with_bounds(ACTUATORS, *reduced.actuators.every_bound())
+        bounds = (each.T.ravel() for each in (reduced.actuators.lower, reduced.actuators.upper))
+        program = program.with_bounds(ACTUATORS, *bounds)
     # the barrier begins where it ends, as multipliers are known: one to four steps confirm most
     # gaits, and more than 30 lead away
     confirming: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}

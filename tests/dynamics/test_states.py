@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from colloc import Chain, Fourier, Friction
+from colloc.dynamics.dynamics import OnSlope, Shapes
 from colloc.dynamics.states import CollocatedStates, Rates
+from colloc.gaits.regime import Regime
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 
@@ -103,3 +106,16 @@ def test_where_states_grow_beyond_all_numbers_no_motion_is_found_and_none_is_war
     growth, equations = 3.46 * mesh.n, CollocatedStates(mesh, free=np.ones(1, dtype=bool))
     slope = np.full((1, 1, mesh.n_point), growth)
     assert not equations.solve(lambda s: Rates(growth * s + 1.0, slope), np.zeros(1))[2]
+
+
+def test_a_slow_motion_down_a_steep_slope_is_found_where_steps_run_out_of_what_balances():
+    """Links that hardly slip sideways: from such a begin of theta, judging a step by the next one
+    ends without a motion, as no rate is known there."""
+    mesh, body = Mesh(scheme("gauss-3"), np.linspace(0.0, 1.0, 21)), Chain()
+    cos, sin = [[0.5, 1.3], [1.3, 1.4]], [[0.4, -0.3], [0.6, 0.6]]
+    shapes = Shapes(*Fourier([-0.9, -1.1], cos, sin)(mesh.times), 0.03)
+    slow = OnSlope(body, body.law(Friction(mu_t=8.0)), Regime(grade=0.6))
+    along = slow.simulate(mesh, shapes, np.array([3.0]))
+    assert along.held.all()
+    turned = slow.equations(mesh).integrals(along.now.z[2:])[0]
+    np.testing.assert_allclose(along.states, 3.0 + turned, atol=1e-9)
