@@ -33,7 +33,7 @@ from benchmarks.tables import markdown_table
 from colloc import Chain, Friction, Harmonic, Problem, solve
 from colloc.gaits.harmonic import harmonics_within
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
-from colloc.results.measured import measured
+from colloc.results.measured import measure
 from colloc.results.solution import SOLVED
 from colloc.verification.adaptive_motion import Path as GaitPath
 from scripts.program import add_to_record, command_line, read_record
@@ -189,7 +189,7 @@ def random_gait(number: int) -> tuple[Chain, Friction, GaitPath]:
 
 def stated(body: Chain, friction: Friction, path: GaitPath) -> dict[str, tuple[float, float]]:
     """Value and error of each quantity, as a certificate states them."""
-    known = measured(body, friction, path, DELTA)
+    known = measure(body, friction, path, DELTA)
     fine, limit = known.fine, known.value.limit
     return {
         "efficiency": (fine.efficiency, known.efficiency.error),

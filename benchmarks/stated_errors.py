@@ -21,7 +21,7 @@ from benchmarks.tables import markdown_table
 from colloc import Chain, Fourier, Friction, NotConvergedError, inertial_motion
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
-from colloc.results.measured import measured
+from colloc.results.measured import measure
 from colloc.verification.differential_motion import GaitOnSlope, GaitWithInertia
 from colloc.verification.replay import replayer
 from scripts.program import command_line
@@ -127,7 +127,7 @@ def slope(case: Case) -> Row:
 def certificate(case: Case) -> Row:
     """Measured as a certificate does."""
     level = case._replace(gait=Fourier(case.gait.mean, case.gait.cos, case.gait.sin))
-    known = measured(*level[:4], rotation=None, run=replayer(Regime(froude=case.froude)))
+    known = measure(*level[:4], rotation=None, run=replayer(Regime(froude=case.froude)))
     played = GaitWithInertia(*level[:4], froude=case.froude, breaks=())
     start = played.momenta(known.fine.tail_velocity(np.zeros(1)))
     return _row(

@@ -22,7 +22,7 @@ from colloc.gaits.symmetry import (
     NONE,
     SYMMETRIES,
     fraction,
-    reduced,
+    solved_phases,
     symmetric_samples,
 )
 from colloc.numerics.mesh import Mesh
@@ -95,8 +95,7 @@ class Corners(GaitFunction):
     @property
     def _along(self) -> np.ndarray:
         """Length of the path up to each vertex [rad]."""
-        sides = np.linalg.norm(np.diff(self.vertices), axis=0)
-        return np.concatenate([[0.0], np.cumsum(sides)])
+        return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.vertices), axis=0)))
 
     @property
     def length(self) -> float:
@@ -128,7 +127,7 @@ class Corners(GaitFunction):
 
     def __call__(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Angles and rates; at a corner those of the side ahead."""
-        phase, _ = reduced(NONE, t)
+        phase, _ = solved_phases(NONE, t)
         phases, vertices = self._whole
         k = np.clip(np.searchsorted(phases, phase, side="right") - 1, 0, phases.size - 2)
         rates = (vertices[:, k + 1] - vertices[:, k]) / (phases[k + 1] - phases[k])
@@ -245,11 +244,8 @@ class Splines(LinearClass):
         return Corners(vertices[:, :-1] if self.symmetry == NONE else vertices, self.symmetry)
 
     def _has_corners_of(self, gait: Any) -> bool:
-        return (
-            isinstance(gait, Corners)
-            and gait.symmetry == self.symmetry
-            and gait.phases.size == self.pieces.size
-        )
+        alike = isinstance(gait, Corners) and gait.symmetry == self.symmetry
+        return alike and gait.phases.size == self.pieces.size
 
     def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
         return np.interp(times, self.pieces, gait.phases) if self.relative_delta else times

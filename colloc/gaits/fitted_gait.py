@@ -19,7 +19,7 @@ from scipy.special import fdtrc, stdtrit
 
 from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Fourier
-from colloc.gaits.record import FEWEST, read_record
+from colloc.gaits.record import FEWEST, LARGEST, read_record
 from colloc.system.errors import ProblemError
 
 _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
@@ -27,7 +27,6 @@ _WORTH, _EXACT = 1.05, 1e-16  # factor and mean square [rad^2] by which scores c
 _PHASES = np.arange(1024) / 1024  # at which a function is sampled
 _GAP = 5  # most steps from the last sample to the next period
 _DRIFT = 0.1  # drift a period that still closes, of a joint's range
-_LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
 _ALIKE = 0.2
 """Excess of the difference of a record from itself one period later over several later, at most."""
 _REPEATED, _DRIFTS = 10.0, 4.0
@@ -47,8 +46,6 @@ file; or a function of phases ``(n_time,)``."""
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Uncertainty of the coefficients of a series through samples."""
-
     directions: np.ndarray
     """Independent changes by a standard deviation, ``(n_direction, n_joint, n_coefficient)``, as
     `Fourier.table`; also of harmonics beyond the series."""
@@ -126,7 +123,7 @@ def fitted_gait(
         return FittedGait(source)
     if record is None and degrees:
         angles = np.radians(angles)
-    elif record is None and (largest := np.abs(angles).max()) > _LARGEST:
+    elif record is None and (largest := np.abs(angles).max()) > LARGEST:
         raise ProblemError(
             f"{name} has an angle of {largest:.4g} rad: if angles are degrees, say so "
             f"(degrees=True, --degrees)."
@@ -189,7 +186,7 @@ class _Samples(NamedTuple):
         time = self.time
         return float(np.median(np.diff(time))) or float(time[-1] - time[0]) / (time.size - 1)
 
-    def fitted(self, fit: _Fit) -> tuple[np.ndarray, np.ndarray]:
+    def least_squares(self, fit: _Fit) -> tuple[np.ndarray, np.ndarray]:
         """Coefficients of the columns of a fit, ``(n_joint, n_number)``, and the residuals."""
         columns = fit.columns(self.time)
         table = np.linalg.lstsq(columns, self.angles.T, rcond=None)[0].T
@@ -294,7 +291,7 @@ class _Samples(NamedTuple):
 
     def gait(self, fit: _Fit) -> FittedGait:
         """The gait without the drift of its record. `ProblemError` if that is not small."""
-        table, _ = self.fitted(fit)
+        table, _ = self.least_squares(fit)
         gait = Fourier.from_table(table[:, int(fit.drifts) :])
         drift = np.abs(table[:, 0]) * fit.drifts  # a period
         ranges = np.ptp(gait.angles(_PHASES), axis=1)
@@ -326,7 +323,7 @@ class _Samples(NamedTuple):
         most = min(time.size - first, round(fit.period / self.step))
         most = min(max((most - 1) // 2, fit.harmonics), _HIGHEST)
         twice, far = (fit._replace(harmonics=min(most, k * fit.harmonics + 1)) for k in (2, 4))
-        (table, residuals), (richer, rest) = self.fitted(fit), self.fitted(far)
+        (table, residuals), (richer, rest) = self.least_squares(fit), self.least_squares(far)
         joints, used = len(table), table.shape[1]
         # whether more harmonics fit better than by chance (F test)
         more, left = richer.shape[1] - used, time.size - richer.shape[1]

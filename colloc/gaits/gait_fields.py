@@ -19,11 +19,9 @@ from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.resistance import Elliptic, PowerLaw, Viscous
-from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import FeetLaw, Foot
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.law import Law
 from colloc.smooth.crawler_body import CrawlerBody
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Concertina, Wave
@@ -83,11 +81,11 @@ def _revive(value: Any) -> Any:
     if isinstance(value, list) and any(isinstance(part, dict) for part in value):
         return tuple(map(_revive, value))
     if isinstance(value, dict) and KIND in value:
-        return _from([*LAWS, *PARTS, *CLASSES, *BODIES], value)
+        return part_from([*LAWS, *PARTS, *CLASSES, *BODIES], value)
     return value
 
 
-def _from(kinds: Sequence[type], stated: dict[str, Any]) -> Any:
+def part_from(kinds: Sequence[type], stated: dict[str, Any]) -> Any:
     """The part that `fields` described. KeyError, TypeError or ProblemError if it did not."""
     values = dict(stated)
     name = values.pop(KIND)
@@ -99,19 +97,7 @@ def _from(kinds: Sequence[type], stated: dict[str, Any]) -> Any:
 
 
 def gait_from(stated: dict[str, Any]) -> AnyGait:
-    return _from(GAITS, stated)
-
-
-def class_from(stated: dict[str, Any]) -> AnyClass:
-    return _from(CLASSES, stated)
-
-
-def law_from(stated: dict[str, Any]) -> Law:
-    return _from([*LAWS, FeetLaw], stated)
-
-
-def body_from(stated: dict[str, Any]) -> Body:
-    return _from(BODIES, stated)
+    return part_from(GAITS, stated)
 
 
 def problem_fields(problem: Any) -> dict[str, Any]:
@@ -135,12 +121,9 @@ def problem_fields(problem: Any) -> dict[str, Any]:
 
 
 def problem_arguments(stated: dict[str, Any]) -> dict[str, Any]:
-    """The arguments of the problem that `problem_fields` described."""
-    kinds = {"guess": gait_from, "body": body_from, "friction": law_from, "gait": class_from}
-    parts = {name: kind(stated[name]) for name, kind in kinds.items()}
-    if "motion" in stated:
-        parts["motion"] = _from(MOTIONS, stated["motion"])
-    return stated | parts
+    kinds = {"guess": GAITS, "body": BODIES, "friction": [*LAWS, FeetLaw], "gait": CLASSES}
+    kinds |= {"motion": MOTIONS} if "motion" in stated else {}
+    return stated | {name: part_from(kind, stated[name]) for name, kind in kinds.items()}
 
 
 def statement_hash(stated: Any) -> str:

@@ -62,7 +62,6 @@ class Fourier(GaitFunction):
 
     @classmethod
     def from_table(cls, table: np.ndarray, *more: Any) -> Any:
-        """The series of a `table`."""
         return cls(table[:, 0], table[:, 1::2], table[:, 2::2], *more)
 
     @property

@@ -89,7 +89,6 @@ def one_sided(limit: Limit) -> bool:
 
 
 def widest(limit: Limit) -> float:
-    """The largest magnitude that the limits allow."""
     each = limit if isinstance(limit, tuple) else (limit,)
     return max(float(np.abs(joint).max()) for joint in each)
 

@@ -189,10 +189,9 @@ class Objective:
 
     def fields(self) -> dict[str, Any]:
         """Plain dictionary (JSON)."""
-        more = (
-            {"quantities": [each.fields() for each in self.quantities]} if self.quantities else {}
-        )
-        return {"expression": self.expression, "name": self.name} | more
+        plain: dict[str, Any] = {"expression": self.expression, "name": self.name}
+        quantities = [each.fields() for each in self.quantities]
+        return plain | ({"quantities": quantities} if quantities else {})
 
 
 def integrals_of(aims: Iterable[Objective]) -> tuple[Quantity, ...]:

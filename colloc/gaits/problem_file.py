@@ -102,7 +102,6 @@ def load_problem(path: str | os.PathLike[str]) -> Problem:
 
 
 def problem_file_text(problem: Problem) -> str:
-    """A problem file for a problem."""
     stated = pprint.pformat(problem.to_dict(), sort_dicts=False, width=100)
     return f"from colloc import Problem\n\nPROBLEM = Problem.from_dict(\n{stated}\n)\n"
 
@@ -110,8 +109,7 @@ def problem_file_text(problem: Problem) -> str:
 def _too_long(what: str, size: int) -> str:
     return (
         f"{what} has {size} bytes, and results keep at most {LONGEST_TEXT}: let the file read "
-        f"large data from another "
-        "file, or state a guess of fewer numbers."
+        "large data from another file, or state a guess of fewer numbers."
     )
 
 
@@ -130,8 +128,7 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
     if content.startswith(_HDF5):
         raise ProblemError(
             f"{path} is a results file (HDF5), not a {kind} file in Python; colloc report or "
-            f"verify reads it, and colloc solve "
-            f"MINE.py --start {path} begins with its gait."
+            f"verify reads it, and colloc solve MINE.py --start {path} begins with its gait."
         )
     if size > LONGEST_TEXT:
         raise ProblemError(_too_long(str(path), size))

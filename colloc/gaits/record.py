@@ -15,7 +15,7 @@ from colloc.system.errors import ProblemError
 
 FEWEST = 6
 """Samples of a gait, and of each of its periods."""
-_LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
+LARGEST = 2 * np.pi  # an angle beyond it is one in degrees
 _DEGREE = np.pi / 180
 _ANGLES = dict.fromkeys(("rad", "rads", "radian", "radians"), 1.0) | {"mrad": 1e-3}
 # Grad is German for degrees
@@ -354,7 +354,7 @@ def _check_size_of_angles(
             f"degrees, such as (ticks - 512) * 300 / 1023 or (ticks - 2048) * 360 / 4096 for "
             f"Dynamixel, and (microseconds - 1500) * 0.09 for pulses."
         )
-    if most * units[worst] <= _LARGEST:
+    if most * units[worst] <= LARGEST:
         return
     if not np.isclose(units[worst], _DEGREE):
         raise ProblemError(

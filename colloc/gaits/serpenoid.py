@@ -100,7 +100,7 @@ class Serpenoid(Harmonic):
         return waves
 
     @property
-    def n_own(self) -> int:
+    def n_wave(self) -> int:
         """Number of parameters of the wave; the Fourier coefficients follow them."""
         return 1 + int(self.symmetry == NONE) + len(self._waves)
 
@@ -108,7 +108,7 @@ class Serpenoid(Harmonic):
         """(mean, cos 1, sin 1, cos 2, ...) of every joint, of a wave; NumPy or CasADi."""
         xp, lag = namespace(wave), wave[0]
         offset = wave[1] if self.symmetry == NONE else 0 * lag
-        amplitudes = [wave[i] for i in range(self.n_own - len(self._waves), self.n_own)]
+        amplitudes = [wave[i] for i in range(self.n_wave - len(self._waves), self.n_wave)]
         table = []
         for place in _places(n_joint):
             row = [offset, *[0 * lag] * (2 * self.harmonics)]
@@ -120,8 +120,8 @@ class Serpenoid(Harmonic):
         return table
 
     def coefficient_slopes(self, wave: np.ndarray, n_joint: int) -> np.ndarray:
-        """Derivatives of `coefficients`, ``(n_joint * (2 K + 1), n_own)``, by complex steps."""
-        steps = wave + 1j * _COMPLEX_STEP * np.eye(self.n_own)
+        """Derivatives of `coefficients`, ``(n_joint * (2 K + 1), n_wave)``, by complex steps."""
+        steps = wave + 1j * _COMPLEX_STEP * np.eye(self.n_wave)
         columns: list = [np.ravel(self.coefficients(step, n_joint)).imag for step in steps]
         return np.array(columns).T / _COMPLEX_STEP
 
@@ -131,11 +131,11 @@ class Serpenoid(Harmonic):
 
     def _basis(self, n_joint: int) -> np.ndarray:
         n = n_joint * (2 * self.harmonics + 1)  # the Fourier coefficients alone enter the angles
-        return np.hstack([np.zeros((n, self.n_own)), np.eye(n)])
+        return np.hstack([np.zeros((n, self.n_wave)), np.eye(n)])
 
     def member(self, parameters: np.ndarray, n_joint: int) -> SerpenoidSeries:
         with np.errstate(over="ignore", invalid="ignore"):  # a series refuses what is not finite
-            table = np.array(self.coefficients(parameters[: self.n_own], n_joint), dtype=float)
+            table = np.array(self.coefficients(parameters[: self.n_wave], n_joint), dtype=float)
         return SerpenoidSeries.from_table(table, float(parameters[0]))
 
     def parameters(self, gait: Fourier) -> np.ndarray:

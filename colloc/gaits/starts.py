@@ -252,8 +252,8 @@ def start_gait(problem: Any, sampler: str, seed: int, start: int) -> Any:
 
 
 def to_body(gait: Any, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> Any:
-    """Transfer a gait of a chain to another body: every link gets the mean tangent angle of the
-    part of the body it covers, and all angles shrink until they are admissible."""
+    """Transfer a gait of a chain: every link gets the mean tangent angle of the part of the body it
+    covers, and all angles shrink until they are admissible."""
     matrix = other.from_chain(np.array(body.lengths))
     angles = matrix @ gait.angles(_PERIOD)
     return gait.mapped(matrix * min(1.0, largest_factor(other, joint_limit, angles)))

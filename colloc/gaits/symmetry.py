@@ -21,7 +21,7 @@ def fraction(symmetry: str) -> float:
     return 1.0 if symmetry == NONE else 0.5
 
 
-def reduced(symmetry: str, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def solved_phases(symmetry: str, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Phases ``(n_time,)`` of the solved part that give phases t, and whether as images."""
     t = np.asarray(t, dtype=float)
     # whole periods are ends, not starts, so that a path that fails to close shows it

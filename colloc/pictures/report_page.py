@@ -42,7 +42,7 @@ _FOOT_WORDS = {
 
 
 def _foot_words(body: Body) -> str:
-    words = [_FOOT_WORDS[kind] for kind in dict.fromkeys(foot_kinds(body))]
+    words = dict.fromkeys(_FOOT_WORDS[kind] for kind in foot_kinds(body))
     return " ".join([*words, "Filled: it holds."] if words else [])
 
 
@@ -54,11 +54,8 @@ def report_page(
     robot: Robot | None = None,
 ) -> str:
     """The page with what exists; `gap` is a sentence about the upper bound, `robot` a section."""
-    problem, certificate, names = (
-        solution.problem,
-        solution.certificate,
-        solution.problem.body.defaults,
-    )
+    problem, certificate = solution.problem, solution.certificate
+    names, replayed = problem.body.defaults, certificate.replayed
     drawn, slow, dry, floor = panels(solution), 0.0, "", list[list[str]]()
     if not problem.froude:
         with suppress(*_UNKNOWN):
@@ -85,9 +82,7 @@ def report_page(
         dry=dry,
         floor=floor,
         gap=gap.strip(),
-        reference=reference.verdict(certificate.efficiency)
-        if reference and certificate.replayed
-        else "",
+        reference=reference.verdict(certificate.efficiency) if reference and replayed else "",
         degrees=math.degrees,
         fields={name: json.dumps(value) for name, value in problem.to_dict().items()},
         source=solution.source or problem_file_text(problem),

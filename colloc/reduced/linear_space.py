@@ -58,7 +58,7 @@ class LinearSpace(SearchSpace):
         lower, upper = control.admissible.bounds()
         self.own = np.arange(lower.size)
         if not self._gaits.linear:
-            self.own = np.delete(self.own, slice(self._gaits.n_own, lower.size - self._n_static))
+            self.own = np.delete(self.own, slice(self._gaits.n_wave, lower.size - self._n_static))
         self.lower, self.upper = lower[self.own], upper[self.own]
         self._peaks = keep_last(
             lambda v: near_peaks(self.trajectory(v), self.mesh, self.checks, self._limit)

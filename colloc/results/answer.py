@@ -12,7 +12,7 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period, finite_array
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, reduced
+from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, solved_phases
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import Sliding
 from colloc.mechanics.chain import Chain
@@ -118,7 +118,7 @@ class CollocatedMotion:
         period, phase = np.divmod(t, 1.0)
         problem, body = self.problem, self.problem.body
         symmetry = problem.regime.motion_symmetry(problem.gait.symmetry)
-        solved, second = reduced(symmetry, phase)  # phases of the solved part
+        solved, second = solved_phases(symmetry, phase)  # phases of the solved part
         mesh, z_points = self.mesh, self._points[2]
         k = np.clip(np.searchsorted(mesh.edges, solved, side="right") - 1, 0, mesh.n - 1)
         tau, theta_0 = (solved - mesh.edges[k]) / mesh.h[k], self.x[self.layout.theta[0, 0]]

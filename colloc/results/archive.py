@@ -43,14 +43,8 @@ UNITS = {
 }
 RETRIED = (ERROR, CRASHED, TIME_LIMIT)
 STATUSES = (
-    SOLVED,
-    TRIVIAL,
-    CERTIFICATE_FAILED,
-    NOT_CONVERGED,
-    PASSED_OVER,
-    TIME_LIMIT,
-    ERROR,
-    CRASHED,
+    *(SOLVED, TRIVIAL, CERTIFICATE_FAILED, NOT_CONVERGED),
+    *(PASSED_OVER, TIME_LIMIT, ERROR, CRASHED),
 )
 _LONGEST_MESSAGE = 1000
 _READERS: dict[Any, Any] = {"int": int, "str": str, "float": float, "AnyGait": gait_from}
@@ -72,8 +66,6 @@ _UNITS = {
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Outcome of one start."""
-
     start: int
     status: str
     message: str
@@ -103,13 +95,11 @@ class Outcome:
 
 
 def outcome_fields(outcome: Outcome) -> dict[str, Any]:
-    """Plain fields (numbers, strings, lists) of an outcome."""
     gaits = {"guess": fields(outcome.guess), "gait": fields(outcome.gait)}
     return {**vars(outcome), "message": outcome.message[:_LONGEST_MESSAGE], **gaits}
 
 
 def outcome_from(entry: dict[str, Any]) -> Outcome:
-    """Outcome from `outcome_fields`."""
     if entry["status"] not in STATUSES:
         raise ValueError(f"no status: {entry['status']}")
     types = {field.name: field.type for field in dataclasses.fields(Outcome)}
@@ -117,7 +107,6 @@ def outcome_from(entry: dict[str, Any]) -> Outcome:
 
 
 def counts(outcomes: Sequence[Outcome]) -> dict[str, int]:
-    """Number of starts of each status that occurs."""
     return {s: n for s in STATUSES if (n := sum(o.status == s for o in outcomes))}
 
 

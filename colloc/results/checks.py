@@ -89,14 +89,11 @@ class Certificate(Period):
         """The certificate with errors of samples added to (value, efficiency, distance, work)."""
         if errors is None or not self.replayed:
             return self
-        value, efficiency, distance, work = errors
+        value, efficiency, *totals = errors
+        pairs = zip(("distance", "work"), totals, strict=True)
         return replace(
             self,
-            errors={
-                **self.errors,
-                "distance": self.errors["distance"] + distance,
-                "work": self.errors["work"] + work,
-            },
+            errors={**self.errors, **{name: self.errors[name] + error for name, error in pairs}},
             value_error=self.value_error + value,
             value_error_at_zero_delta=self.value_error_at_zero_delta + value,
             efficiency_error=self.efficiency_error + efficiency,

@@ -52,7 +52,7 @@ def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limi
     return Limit(float(values[2] + linear * second), float(left + own))
 
 
-def measured(
+def measure(
     body: Body,
     friction: Law,
     path: Path,

@@ -161,7 +161,6 @@ def _labels(columns: dict[str, Column]) -> dict[str, list]:
 
 
 def hinges(body: Body) -> slice:
-    """Points of the outline that are joints."""
     return slice(1, -1) if isinstance(body, Chain) else slice(0, 0)
 
 

@@ -13,7 +13,7 @@ from colloc.mechanics.chain import BALANCED, Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import Certificate, Check
-from colloc.results.measured import astray, measured
+from colloc.results.measured import astray, measure
 from colloc.search.options import TOLERANCES
 from colloc.verification.adaptive_motion import Path, Replay
 from colloc.verification.mesh_error import mesh_error
@@ -123,7 +123,7 @@ def gait_certificate(
     """The certificate of any gait, by its replay at three deltas, with further checks before and
     after: of a path of angles and rates, whose rates jump at phases `breaks`, and of a `claimed`
     value of the objective."""
-    result = measured(
+    result = measure(
         *(problem.body, problem.law, path, delta),
         tolerance=tolerance,
         instants=instants,

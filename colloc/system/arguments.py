@@ -150,12 +150,8 @@ def _fits(value: Any, kind: Any) -> bool:
         return _KINDS[kind][1](value)
     if kind in _SEQUENCES:
         listed = isinstance(value, Iterable) and not isinstance(value, (str, bytes, Mapping))
-        items = _alternatives(item)
-        return (
-            listed
-            and hasattr(value, "__len__")
-            and all(any(_fits(x, t) for t in items) for x in value)
-        )
+        items = _alternatives(item) if listed and hasattr(value, "__len__") else ()
+        return bool(items) and all(any(_fits(x, t) for t in items) for x in value)
     if kind is Any or not isinstance(kind, type):
         return True
     return not isinstance(value, type) and isinstance(value, kind)

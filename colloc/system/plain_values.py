@@ -15,12 +15,11 @@ import numpy as np
 
 
 class Codec:
-    """Encoder and decoder of values of listed classes; those of `own` are stored by an encoder and
-    a decoder of their own."""
+    """Encoder and decoder of values of listed classes, or by the pairs of `custom` functions."""
 
-    def __init__(self, kinds: Iterable[type], own: Mapping[type, Any] | None = None) -> None:
+    def __init__(self, kinds: Iterable[type], custom: Mapping[type, Any]) -> None:
         self._kinds = {kind.__name__: kind for kind in kinds}
-        self._own = {kind.__name__: how for kind, how in (own or {}).items()}
+        self._custom = {kind.__name__: pair for kind, pair in custom.items()}
 
     def encode(self, value: Any) -> Any:
         """Encode a value as plain JSON. `TypeError` for a class that is not listed."""
@@ -34,8 +33,8 @@ class Codec:
         if isinstance(value, np.ndarray):
             text = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode()
             return {"array": text, "type": value.dtype.str, "shape": list(value.shape)}
-        if name in self._own:
-            of = self._own[name][0](value)
+        if name in self._custom:
+            of = self._custom[name][0](value)
         elif name in self._kinds:
             names = getattr(value, "_fields", None) or [x.name for x in dataclasses.fields(value)]
             of = {each: self.encode(getattr(value, each)) for each in names}
@@ -61,8 +60,8 @@ class Codec:
             return tuple(self.decode(part) for part in of)
         if name == "dict":
             return {self.decode(k): self.decode(v) for k, v in of}
-        if name in self._own:
-            return self._own[name][1](of)
+        if name in self._custom:
+            return self._custom[name][1](of)
         kind, values = self._kinds[name], {key: self.decode(part) for key, part in of.items()}
         if issubclass(kind, tuple):
             return kind(**values)

@@ -122,7 +122,7 @@ class FullProgram(Program):
 
             def deviation(w: ca.SX) -> ca.SX:
                 given = ca.vertcat(*(a for row in gaits.coefficients(w, n_joint) for a in row))
-                return w[gaits.n_own : gaits.n_own + given.numel()] - given
+                return w[gaits.n_wave : gaits.n_wave + given.numel()] - given
 
             members = self.repeat(deviation, [p])
         crossing = limits.repeat(self)

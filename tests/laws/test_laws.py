@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import quad
 
 from colloc import Chain, Elliptic, Friction, ModalBody, OwnLaw, PowerLaw, Viscous, solve_balance
-from colloc.gaits.gait_fields import LAWS, fields, law_from
+from colloc.gaits.gait_fields import LAWS, fields, part_from
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.friction import ClosedForm, line_integrals
@@ -277,4 +277,4 @@ def test_the_power_law_ends_in_drag_and_in_coulomb_friction():
 def test_a_law_is_kept_in_files(law):
     assert isinstance(law, Law)
     assert type(law) in LAWS
-    assert law_from(fields(law)) == law
+    assert part_from(LAWS, fields(law)) == law

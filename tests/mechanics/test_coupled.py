@@ -5,7 +5,7 @@ import pytest
 
 import colloc
 from colloc import Chain, Coupled, Friction, Harmonic, Problem, ProblemError
-from colloc.gaits.gait_fields import class_from, fields, gait_from
+from colloc.gaits.gait_fields import CLASSES, fields, gait_from, part_from
 from colloc.mechanics.densities import JointMap
 from colloc.results.robot import joint_torques
 
@@ -123,7 +123,7 @@ def test_its_sensitivity_is_to_the_chain_that_it_moves(broken):
 
 def test_it_is_kept_in_files(tmp_path, broken):
     for gait in (BELTS, BROKEN):
-        assert class_from(fields(gait)) == gait
+        assert part_from(CLASSES, fields(gait)) == gait
     t = np.linspace(0, 1, 9)
     read = gait_from(fields(broken.gait))
     np.testing.assert_array_equal(read.angles(t), broken.gait.angles(t))

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from colloc.commands.results import export
-from colloc.gaits.gait_fields import body_from, class_from, fields
+from colloc.gaits.gait_fields import BODIES as KINDS
+from colloc.gaits.gait_fields import CLASSES, fields, part_from
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.problem import Problem
@@ -103,10 +104,12 @@ def test_the_work_on_the_mesh_is_that_of_the_general_solver(body):
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])
 def test_bodies_answer_every_question_and_can_be_kept(body):
     assert isinstance(body, Body)
-    assert body_from(fields(body)) == body
+    assert part_from(KINDS, fields(body)) == body
     gait = Problem("any", body=body).gait
     assert (
-        gait == class_from(fields(gait)) == Prescribed(body.prescribed().stages, body.symmetries[0])
+        gait
+        == part_from(CLASSES, fields(gait))
+        == Prescribed(body.prescribed().stages, body.symmetries[0])
     )
 
 
