@@ -30,7 +30,7 @@ _FIRST, _FASTEST, _FARTHEST = 0.3, 10.0, np.log(5.0)
 nobody is slow; and the farthest step between the logarithms of two."""
 
 
-def played(
+def efficiency_at(
     body: Chain,
     friction: Law,
     gait: Path,
@@ -127,7 +127,7 @@ def slow_enough(
 def _froude(body: Chain, friction: Law, gait: Path, mesh: Mesh, delta: float, loss: float) -> float:
     """Froude number at which inertia first changes the efficiency by the part `loss`."""
     at_pace = body, friction, gait, mesh, delta
-    slow, states = played(*at_pace)
+    slow, states = efficiency_at(*at_pace)
     # the change is a power of the Froude number where both are small
     low = -np.inf
     high = np.log(_FASTEST * friction.largest)
@@ -135,7 +135,7 @@ def _froude(body: Chain, friction: Law, gait: Path, mesh: Mesh, delta: float, lo
     fastest, power = high, _POWER
     tried: list[tuple[float, float]] = []
     while high - low > _ACCURACY / _POWER:
-        efficiency, states = played(*at_pace, float(np.exp(at)), states)
+        efficiency, states = efficiency_at(*at_pace, float(np.exp(at)), states)
         more = float(np.log(max(abs(1.0 - efficiency / slow), 1e-12) / loss))
         if abs(more) < _ACCURACY:
             return float(np.exp(at))

@@ -162,8 +162,8 @@ class CollocatedStates:
             if (off < _CLOSED).all():
                 break
             linear = _Linear(self._a, self._b, now.on_states)
-            own = linear.at_points(linear.own(left_over), np.zeros_like(begins.T))
-            step = np.repeat(share, s) * own
+            newton = linear.by_point(linear.stages(left_over))
+            step = np.repeat(share, s) * newton
             trial = states - step
             *_, off_then = residual(trial)
             nearer = (off_then < off) | (by_interval(step) < _ROUNDED)
@@ -195,7 +195,7 @@ class CollocatedStates:
 
         @_FAR
         def step(residual: np.ndarray) -> np.ndarray:
-            own, through, gained = within.handed_on(residual[:, :-1])
+            own, through, gained = within.condense(residual[:, :-1])
             start = np.zeros(len(residual))
             if free.size:
                 off = residual[free, -1] - gained[-1, free]
@@ -248,22 +248,22 @@ class _Linear:
             *at_points.shape[:-2], n, s * k
         )
 
-    def _by_point(self, by_interval: np.ndarray) -> np.ndarray:
+    def by_point(self, by_interval: np.ndarray) -> np.ndarray:
         n, s, k = self._shape
         return np.moveaxis(by_interval.reshape(*by_interval.shape[:-2], n, s, k), -1, -3).reshape(
             *by_interval.shape[:-2], k, n * s
         )
 
-    def own(self, right: np.ndarray) -> np.ndarray:
+    def stages(self, right: np.ndarray) -> np.ndarray:
         """Stages for a right side ``(k, n_point)`` with zero begins, ``(n, s k)``."""
         return (self._inverse @ self._by_interval(right)[:, :, None])[:, :, 0]
 
-    def handed_on(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def condense(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Stages of a right side with zero begins, and states at the edges as ``through @ begin +
         gained``."""
-        own, k = self.own(right), len(right)
+        own, k = self.stages(right), len(right)
         more = self._gain @ own[:, :, None]
-        through, gained = _one_after_another(
+        through, gained = _prefix_products(
             self._through.transpose(0, 2, 1), more.transpose(0, 2, 1)
         )
         begin = np.eye(k, k + 1)[None]
@@ -274,7 +274,7 @@ class _Linear:
 
     def at_points(self, own: np.ndarray, begins: np.ndarray) -> np.ndarray:
         """States ``(k, n_point)`` from those at the begins of the intervals, ``(n, k)``."""
-        return self._by_point(own + (self._response @ begins[:, :, None])[:, :, 0])
+        return self.by_point(own + (self._response @ begins[:, :, None])[:, :, 0])
 
     def vjp(
         self, of_states: np.ndarray, of_end: np.ndarray | None = None
@@ -284,7 +284,7 @@ class _Linear:
         (n, s, k), given = self._shape, self._by_interval(of_states)
         through = np.einsum("mni,nia->mna", given, self._response)
         end = np.zeros((len(given), k)) if of_end is None else of_end
-        back, gained = _one_after_another(self._through[::-1], through.transpose(1, 0, 2)[::-1])
+        back, gained = _prefix_products(self._through[::-1], through.transpose(1, 0, 2)[::-1])
         before = end @ back + gained
         later = np.concatenate([end[None], before[:-1]])[::-1].transpose(1, 0, 2)
         mu = np.einsum(
@@ -294,11 +294,11 @@ class _Linear:
         on_rates = (
             np.einsum("mnia,nij->mnja", stages, self._a) + self._b[:, :, None] * later[:, :, None]
         )
-        return before[-1], self._by_point(on_rates.reshape(-1, n, s * k)), later.transpose(0, 2, 1)
+        return before[-1], self.by_point(on_rates.reshape(-1, n, s * k)), later.transpose(0, 2, 1)
 
 
-def _one_after_another(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Prefix products of affine maps ``x -> x t + c`` in log2 n steps."""
+def _prefix_products(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of affine maps ``x -> x t + c`` in log2 n steps."""
     t, c, reach = t.copy(), c.copy(), 1
     while reach < len(t):
         c[reach:] += c[:-reach] @ t[reach:]

@@ -7,7 +7,7 @@ import pytest
 from shared.points import wrench
 
 import colloc
-from colloc.dynamics.slow_enough import SCHEME, played
+from colloc.dynamics.slow_enough import SCHEME, efficiency_at
 from colloc.mechanics.inertia import momentum_rates
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
@@ -121,9 +121,9 @@ def test_slow_motion_is_the_limit():
     slow = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2, tolerance=1e-7).efficiency
     mesh = Mesh(scheme(SCHEME), np.linspace(0, 1, 401))
     at = CHAIN, ISOTROPIC, GAIT, mesh, 1e-2
-    on_mesh, _ = played(*at)
+    on_mesh, _ = efficiency_at(*at)
     assert on_mesh == pytest.approx(slow, rel=1e-5)
-    off = [1 - played(*at, froude)[0] / on_mesh for froude in (1.6e-3, 4e-4, 1e-4)]
+    off = [1 - efficiency_at(*at, froude)[0] / on_mesh for froude in (1.6e-3, 4e-4, 1e-4)]
     assert off[0] > 3.5 * off[1] > 3.5**2 * off[2] > 0
 
 

@@ -1,4 +1,4 @@
-/* Momenta that repeat every period: `CollocatedStates.solve_natural` of colloc/dynamics/states.py, step by step, with the rates of
+/* Momenta that repeat every period: `CollocatedStates.solve` of colloc/dynamics/states.py, step by step, with the rates of
    momenta.h. On an interval the stages are `own + response begin`, and its end is `through begin + gain own`. */
 
 #pragma once
