@@ -6,11 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from colloc import Chain, Friction
 from colloc.bounds.motions import CoulombMotion, admissible, balanced_motion
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
 from research.small_gaits import best_small_gait, small_gait
 from tests.shared.laws import coulomb
 

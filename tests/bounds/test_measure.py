@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
+from colloc import Chain, Friction, ProblemError
 from colloc.bounds.motions import Domain
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
 from colloc.bounds.sampled import Budget, compute_bound
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
-from colloc.system.errors import ProblemError
 from scripts.check_potential import Kept, keep, largest_ratio, potentials
 
 LIMIT = 2.5

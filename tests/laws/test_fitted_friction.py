@@ -27,27 +27,23 @@ def test_a_law_is_found_again_from_its_coefficients():
         "-where(vs > 0, 0.3 + 0.2*exp(-speed/0.2), 0.5 + 0.1*speed)*vs/speed",
         "-(0.8 + 0.3*exp(-speed/0.2))*vn/speed",
     )
-    found = fitted_friction(
-        table(stribeck(0.3, 0.2, 0.2), stribeck(0.8, 0.3, 0.2), stribeck(0.5, 0.0, 1.0, 0.1))
-    )
+    along, across, back = (0.3, 0.2, 0.2), (0.8, 0.3, 0.2), (0.5, 0.0, 1.0, 0.1)
+    found = fitted_friction(table(stribeck(*along), stribeck(*across), stribeck(*back)))
     assert found.largest < 1e-5
     for angle in np.linspace(0.1, 6.2, 9):
-        np.testing.assert_allclose(
-            forces(found.law, SPEED, angle), forces(stated, SPEED, angle), atol=2e-5
-        )
+        own, known = (forces(law, SPEED, angle) for law in (found.law, stated))
+        np.testing.assert_allclose(own, known, atol=2e-5)
 
 
 def test_samples_without_a_trend_are_dry_friction():
     noise = 0.02 * np.random.default_rng(4).normal(size=(3, 25))
     found = fitted_friction(table(0.5 + noise[0], 0.9 + noise[1], 0.7 + noise[2]))
-    assert isinstance(found.law, Friction)
-    np.testing.assert_allclose(
-        [found.law.mu_f, found.law.mu_t, found.law.mu_b], [0.5, 0.9, 0.7], atol=0.015
-    )
+    law = found.law
+    assert isinstance(law, Friction)
+    assert (law.mu_f, law.mu_t, law.mu_b) == pytest.approx((0.5, 0.9, 0.7), abs=0.015)
     assert found.rms == pytest.approx(0.02, rel=0.3)
-    assert fitted_friction(table(stribeck(0.5, 0, 1), stribeck(0.9, 0, 1))).law == Friction(
-        mu_t=0.9, mu_f=0.5, mu_b=0.5
-    )
+    exact = fitted_friction(table(stribeck(0.5, 0, 1), stribeck(0.9, 0, 1))).law
+    assert exact == Friction(mu_t=0.9, mu_f=0.5, mu_b=0.5)
 
 
 def test_a_few_samples_are_not_read_as_more_than_a_number_or_two():
@@ -68,9 +64,9 @@ def test_noise_is_smoothed(seed):
 
 def test_metres_and_seconds_are_the_same_law():
     """A robot of 0.5 m that takes 4 s: one body length per period is 0.125 m/s."""
-    own = fitted_friction(table(stribeck(0.3, 0.2, 0.2), stribeck(0.8, 0.3, 0.2))).law
-    scaled = table(stribeck(0.3, 0.2, 0.2), stribeck(0.8, 0.3, 0.2)) * [0.125, 1, 1]
-    fitted = fitted_friction(scaled, length=0.5, period=4.0)
+    samples = table(stribeck(0.3, 0.2, 0.2), stribeck(0.8, 0.3, 0.2))
+    own = fitted_friction(samples).law
+    fitted = fitted_friction(samples * [0.125, 1, 1], length=0.5, period=4.0)
     metres = fitted.law
     assert "a body length per period is a speed of 0.125 (speed_unit)" in str(fitted)
     np.testing.assert_allclose(forces(metres, SPEED, 0.7), forces(own, SPEED, 0.7), rtol=1e-4)
@@ -81,13 +77,11 @@ def test_it_is_a_law_like_any_other(tmp_path):
     """NumPy, CasADi, certificate and file, from a file of samples."""
     path = tmp_path / "floor.csv"
     values = table(stribeck(0.7, -0.2, 0.5), stribeck(1.4, -0.4, 0.5))
-    np.savetxt(
-        path, values[:, [0, 2, 1]], delimiter=",", header="speed,sideways,forward", comments=""
-    )
+    header = {"header": "speed,sideways,forward", "comments": ""}
+    np.savetxt(path, values[:, [0, 2, 1]], delimiter=",", **header)
     law = fitted_friction(path).law
-    problem = Problem(
-        "measured", friction=law, gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-3
-    )
+    asked = {"gait": Harmonic(1, "bilateral"), "delta": 1e-2, "mesh_tolerance": 1e-3}
+    problem = Problem("measured", friction=law, **asked)
     found = colloc.solve(problem, starts=1)
     assert found.status == "solved"
     stated = OwnLaw(
@@ -107,34 +101,23 @@ def test_it_opposes_every_motion_whatever_the_samples():
         assert law.smallest > 0
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (
-            "speed,along,across\n0.1,0.5,0.5\n0.2,-0.1,0.5\n0.3,0.5,0.5\n",
-            "sample 2: the coefficient along is -0.1",
-        ),
-        (
-            "speed,along\n0.1,0.5\n0.2,0.5\n0.3,0.4\n",
-            "no column 'across': its columns are speed, along",
-        ),
-        ("0.1,0.5\n0.2,0.5\n0.3,0.4\n", "has 2 columns: write the speed"),
-        (
-            "speed,along,across\n0.1,0.5,x\n0.2,0.1,0.5\n0.3,0.5,0.5\n",
-            "sample 1: '0.1,0.5,x' is not 3 finite numbers",
-        ),
-        ("speed,along,across\n0.1,0.5,0.5\n", "holds 1 samples: at least 3"),
-        ("speed,along,across\n-0.1,0.5,0.5\n0.2,0.1,0.5\n0.3,0.5,0.5\n", "speed -0.1 is negative"),
-        ("speed,along,across\n0,0.5,0.5\n0,0.1,0.5\n0,0.5,0.5\n", "all speeds are 0"),
-        ("0.1,0.5,0.5\n0.2,1e10,0.5\n0.3,0.4,0.5\n", "must be below 1e"),
-        (
-            "\n".join(f"{k},{0.2 + 0.8 * (k % 2)},0.5" for k in range(1, 12)),
-            "no smooth curve is near",
-        ),
-    ],
-)
-def test_a_table_that_cannot_be_used_is_refused_in_a_sentence(text, words, tmp_path):
+NAMED = "speed,along,across;"
+UNUSABLE = {
+    NAMED + "0.1,0.5,0.5;0.2,-0.1,0.5;0.3,0.5,0.5": "sample 2: the coefficient along is -0.1",
+    "speed,along;0.1,0.5;0.2,0.5;0.3,0.4": "no column 'across': its columns are speed, along",
+    "0.1,0.5;0.2,0.5;0.3,0.4": "has 2 columns: write the speed",
+    NAMED + "0.1,0.5,x;0.2,0.1,0.5;0.3,0.5,0.5": "sample 1: '0.1,0.5,x' is not 3 finite numbers",
+    NAMED + "0.1,0.5,0.5": "holds 1 samples: at least 3",
+    NAMED + "-0.1,0.5,0.5;0.2,0.1,0.5;0.3,0.5,0.5": "speed -0.1 is negative",
+    NAMED + "0,0.5,0.5;0,0.1,0.5;0,0.5,0.5": "all speeds are 0",
+    "0.1,0.5,0.5;0.2,1e10,0.5;0.3,0.4,0.5": "must be below 1e",
+    ";".join(f"{k},{0.2 + 0.8 * (k % 2)},0.5" for k in range(1, 12)): "no smooth curve is near",
+}
+
+
+@pytest.mark.parametrize(("rows", "words"), UNUSABLE.items())
+def test_a_table_that_cannot_be_used_is_refused_in_a_sentence(rows, words, tmp_path):
     path = tmp_path / "floor.csv"
-    path.write_text(text)
+    path.write_text(rows.replace(";", "\n"))
     with pytest.raises(ProblemError, match=words):
         fitted_friction(path)

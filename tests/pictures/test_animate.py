@@ -31,13 +31,10 @@ def test_every_picture_shows_the_body_where_it_is_then(three_link):
     scale = 0.68 * wide / (high - low)[0]
     motion = three_link.sample(np.arange(6) / 2)
     x, y = lab_outline(three_link.problem.body, motion)
+    x_mid, y_mid = (0.5 * (each.min(axis=0) + each.max(axis=0)) for each in (x, y))
     room = tall - 0.13 * wide  # the lower part, of this height
-    columns = 0.015 * wide + scale * (0.5 * (x.min(axis=0) + x.max(axis=0)) - low[0])
-    rows = (
-        0.97 * tall
-        - 0.5 * room
-        - scale * (0.5 * (y.min(axis=0) + y.max(axis=0)) - 0.5 * (low + high)[1])
-    )
+    columns = 0.015 * wide + scale * (x_mid - low[0])
+    rows = 0.97 * tall - 0.5 * room - scale * (y_mid - 0.5 * (low + high)[1])
     middle_x, middle_y, across, upwards = np.transpose([dark(picture) for picture in drawn])
     np.testing.assert_allclose(middle_x, columns, atol=1.0)
     np.testing.assert_allclose(middle_y, rows, atol=3.0)  # the head is a disc

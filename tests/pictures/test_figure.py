@@ -9,23 +9,17 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from shared.readable import assert_readable
 
-from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc import Chain, Foot, Fourier, Friction, Harmonic, ModalBody, Pad, Problem, Wheel
 from colloc.gaits.limits import under_one_limit
-from colloc.gaits.problem import Problem
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
-from colloc.mechanics.floor_contact import Foot, Pad, Wheel
-from colloc.mechanics.friction import Friction
 from colloc.pictures.figure import draw_filmstrip, draw_lab, forbidden, panels
 from colloc.results.motion import foot_kinds
-from colloc.smooth.modal_body import ModalBody
 
 
 def crawler(n_link, size=0.6):
-    j = np.arange(n_link - 1)
-    guess = Fourier(
-        np.zeros(n_link - 1), size * np.cos(0.9 * j)[:, None], size * np.sin(0.9 * j)[:, None] + 0.1
-    )
+    """A travelling wave along a chain."""
+    lag = 0.9 * np.arange(n_link - 1.0)[:, None]
+    guess = Fourier(0 * lag[:, 0], size * np.cos(lag), size * np.sin(lag) + 0.1)
     body, friction = Chain((1 / n_link,) * n_link), Friction(mu_t=1.5, mu_f=1.0, mu_b=1.2)
     return Problem("crawler", guess, body, friction, Harmonic(1), delta=1e-2, intervals=8)
 
@@ -51,11 +45,8 @@ def test_no_words_over_words_and_nothing_cut_off(n_link, size, unsolved):
     solution = unsolved(crawler(n_link, size))
     texts = assert_readable(solution.plot())
     named = range(2, n_link) if n_link <= 9 else (4, 7, 9, 12)
-    assert (
-        "joint angle 2  [rad]" in texts
-        if n_link == 3
-        else {"joint 1", *map(str, named)} <= set(texts)
-    )
+    joints = {"joint angle 2  [rad]"} if n_link == 3 else {"joint 1", *map(str, named)}
+    assert joints <= set(texts)
 
 
 @pytest.mark.parametrize("n_link", [6, 13])
@@ -93,10 +84,8 @@ def test_feet_wheels_and_pads_differ_and_the_key_says_which_is_which(unsolved):
     links = fine.theta[0] + np.cumsum(np.insert(fine.angles[:, 0], 0, 0.0))
     for line, wanted in ((wheels, [(1, -0.6), (1, 0.6), (3, 0.0)]), (pad, [(2, 0.0)])):
         first, last = (np.array(line.get_data())[:, end::3] for end in (0, 1))
-        direction = np.arctan2(*(last - first)[::-1])
-        np.testing.assert_allclose(
-            np.sin(direction - [links[link] + angle for link, angle in wanted]), 0, atol=1e-9
-        )
+        off = np.arctan2(*(last - first)[::-1]) - [links[link] + angle for link, angle in wanted]
+        np.testing.assert_allclose(np.sin(off), 0, atol=1e-9)
 
 
 def test_a_figure_in_the_lab_says_of_how_many_periods_it_is(unsolved):
@@ -127,18 +116,14 @@ def test_panels_alone_can_be_read_and_hold_all_that_is_drawn(name, three_link):
     figure = panels(three_link)[name].figure()
     assert_readable(figure)
     (axes,) = figure.axes
-    for seen, drawn in (
-        (axes.viewLim.intervalx, axes.dataLim.intervalx),
-        (axes.viewLim.intervaly, axes.dataLim.intervaly),
-    ):
+    for side in ("intervalx", "intervaly"):
+        seen, drawn = getattr(axes.viewLim, side), getattr(axes.dataLim, side)
         rounding = 1e-6 * np.ptp(seen)  # of older ones of matplotlib
         assert min(seen) - rounding <= min(drawn) <= max(drawn) <= max(seen) + rounding
 
 
 @pytest.mark.parametrize("n_link", [2, 3, 5])
-def test_snapshots_never_touch_and_are_the_body_in_the_lab_with_its_centre_moved_to_their_places(
-    n_link, unsolved
-):
+def test_snapshots_never_touch_and_are_the_body_in_the_lab_moved_to_their_places(n_link, unsolved):
     solution, axes = unsolved(crawler(n_link, 1.5)), Figure().add_subplot()
     draw_filmstrip(axes, solution)
     drawn, motion = bodies(axes), solution.sample(np.linspace(0.0, 1.0, 11))
@@ -146,9 +131,8 @@ def test_snapshots_never_touch_and_are_the_body_in_the_lab_with_its_centre_moved
     for left, right in pairwise(drawn):
         assert 0.1 < right[0].min() - left[0].max() < 0.6
     tails = np.stack([body[:, 0] for body in drawn], axis=1)
-    centres = np.concatenate(
-        [line.get_data() for line in axes.lines if line.get_marker() == "+"], axis=1
-    )
+    marks = [line.get_data() for line in axes.lines if line.get_marker() == "+"]
+    centres = np.concatenate(marks, axis=1)
     np.testing.assert_allclose(tails[1], motion.tail[1], atol=1e-12)
     np.testing.assert_allclose(centres - tails, motion.centre - motion.tail, atol=1e-12)
     said = [float(text.get_text().replace("−", "-")) for text in axes.texts]
@@ -185,9 +169,8 @@ def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
     shapes = np.random.default_rng(7).uniform(-np.pi, np.pi, (body.n_joint, 20000))
     shapes = np.concatenate([shapes, 0.4 * shapes], axis=1)
     stretched, most = under_one_limit(shapes, limit)
-    allowed = shapes[
-        :, (body.bounded_angles.largest(stretched) <= most) & (crossing_depth(body, shapes) == 0)
-    ]
+    within = body.bounded_angles.largest(stretched) <= most
+    allowed = shapes[:, within & (crossing_depth(body, shapes) == 0)]
     assert allowed.shape[1] > 100
     column, row = (np.abs(grid[:, None] - allowed[j]).argmin(axis=0) for j in plane)
     # no deeper than the nearest point of the grid may be

@@ -16,7 +16,6 @@ from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
 from colloc.pictures.movie import frames
 from colloc.pictures.report_page import report_page
 from colloc.results.checks import Check
@@ -24,6 +23,7 @@ from colloc.results.motion import lab_outline
 from colloc.results.solution import Solution
 from colloc.search.certify import certify
 from colloc.search.evaluate import evaluate
+from tests.pictures.test_figure import crawler
 
 BROWSER = next(
     (path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path),
@@ -65,25 +65,6 @@ def outline(page):
     parser.close()
     assert parser.open == []
     return parser
-
-
-def crawler(n_link, **changes):
-    """A travelling wave along a chain of n_link links."""
-    j = np.arange(n_link - 1)
-    fields = {
-        "name": f"crawler{n_link}",
-        "body": Chain((1 / n_link,) * n_link),
-        "friction": Friction(mu_t=1.5, mu_f=1.0, mu_b=1.2),
-        "gait": Harmonic(1),
-        "guess": Fourier(
-            np.zeros(n_link - 1),
-            0.6 * np.cos(0.9 * j)[:, None],
-            0.6 * np.sin(0.9 * j)[:, None] + 0.1,
-        ),
-        "delta": 1e-2,
-        "intervals": 8,
-    }
-    return Problem(**{**fields, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +148,7 @@ def test_chains_of_two_to_eight_links(n_link, unsolved):
 
 @pytest.mark.parametrize("n_link", [2, 3, 5])
 def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
-    problem = crawler(n_link, delta=1e-3)
+    problem = crawler(n_link).with_(delta=1e-3)
     shown = frames(solution := unsolved(problem), count=241, arrows=300)
     lengths = np.hypot(*np.diff(shown.ends, axis=1))
     np.testing.assert_allclose(lengths, np.full_like(lengths, 1 / n_link), atol=1e-12)
@@ -176,17 +157,13 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     # bound on a mesh of eight intervals
     total = shown.arrow.mean(axis=1)
     assert np.median(np.hypot(*total)) < 0.02
-    spent = (
-        -(shown.arrow * np.gradient(shown.arrow_base, shown.motion.t, axis=2))
-        .sum(axis=0)
-        .mean(axis=0)
-    )
+    velocity = np.gradient(shown.arrow_base, shown.motion.t, axis=2)
+    spent = -(shown.arrow * velocity).sum(axis=0).mean(axis=0)
     assert np.trapezoid(spent, shown.motion.t) == pytest.approx(solution.measured.work, rel=5e-3)
     drawn, (low, high) = shown.arrow_scale * shown.arrow, shown.window
     assert np.hypot(*drawn).max() == pytest.approx(0.12)
-    tips = np.concatenate(
-        [before.of((shown.arrow_base + drawn).reshape(2, -1)) for before in shown.before], axis=1
-    )
+    tips = (shown.arrow_base + drawn).reshape(2, -1)
+    tips = np.concatenate([before.of(tips) for before in shown.before], axis=1)
     assert np.all(low < tips.min(axis=1))
     assert np.all(tips.max(axis=1) < high)
     assert np.all(high - low < np.ptp(tips, axis=1) + 0.48)
@@ -196,7 +173,8 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
 def turning(unsolved):
     """A gait that turns, asked for the angle by which it does, with a replay; not an optimum."""
     guess = Fourier(mean=[0.5, 0.9], cos=[[1.0], [0.2]], sin=[[0.0], [1.1]])
-    free = unsolved(crawler(3, rotation=None, guess=guess, intervals=40, mesh_tolerance=0))
+    how = {"rotation": None, "guess": guess, "intervals": 40, "mesh_tolerance": 0}
+    free = unsolved(crawler(3).with_(**how))
     assert abs(free.rotation) > 0.1
     problem = free.problem.with_(rotation=free.rotation)
     asked = replace(free, problem=problem, answer=replace(free.answer, problem=problem))
@@ -228,9 +206,8 @@ def test_the_browser_draws_every_period_where_the_body_is_then(turning, tmp_path
     motion = turning.sample(np.array([0.3, 1.5, 2.7]))
     # hinges, then the head
     joints = lab_outline(turning.problem.body, motion)[:, 1:]
-    x, y = (
-        np.concatenate([joints, motion.centre[:, None]], axis=1).transpose(0, 2, 1).reshape(2, -1)
-    )
+    drawn = np.concatenate([joints, motion.centre[:, None]], axis=1)
+    x, y = drawn.transpose(0, 2, 1).reshape(2, -1)
     one, none = np.ones_like(x), np.zeros_like(x)
     rows = np.concatenate([np.stack([x, one, none]), np.stack([-y, none, one])], axis=1).T
     pixels = seen.T.ravel()
@@ -261,15 +238,11 @@ def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
         "draw(performance.now()), 16);</script></head>"
     )
     result = browsed(report_page(three_link).replace("</head>", clock), tmp_path)
-    assert "CONSOLE" not in result.stderr, [
-        line for line in result.stderr.splitlines() if "CONSOLE" in line
-    ]
+    assert not [line for line in result.stderr.splitlines() if "CONSOLE" in line]
     assert 'data-ready="yes"' in result.stdout
     phase = float(re.search(r"t = ([0-9.]+)</output>", result.stdout).group(1))
     assert phase > 0.1  # it plays
-    cursor = (
-        r'class="cursor" data-low="([0-9.]+)" data-high="([0-9.]+)" style="[^"]*left: ([0-9.]+)%'
-    )
+    cursor = r'class="cursor" data-low="([\d.]+)" data-high="([\d.]+)" style="[^"]*left: ([\d.]+)%'
     cursors = re.findall(cursor, result.stdout)
     assert len(cursors) == 3
     for low, high, left in cursors:
