@@ -17,22 +17,10 @@ from scripts.models.ellipses import admissible
 def test_other_tools_are_given_the_same_physics(delta):
     rng = np.random.default_rng(1)
     for _ in range(5):
-        own, t, theta, z = (
-            rng.normal(size=3),
-            rng.uniform(0, np.pi),
-            rng.normal(),
-            rng.normal(size=3),
-        )
+        (own, z), t, theta = rng.normal(size=(2, 3)), rng.uniform(0, np.pi), rng.normal()
         balance, rates = physics.balance_and_rates(np, t, theta, z, own, delta)
-        gait, phase = ellipse(*own), np.array([t / (2 * np.pi)])
-        now = instant(
-            Chain(),
-            Friction(),
-            gait.angles(phase),
-            gait.rates(phase) / (2 * np.pi),
-            z[:, None],
-            delta,
-        )
+        angles, speeds = ellipse(*own)(np.array([t / (2 * np.pi)]))
+        now = instant(Chain(), Friction(), angles, speeds / (2 * np.pi), z[:, None], delta)
         np.testing.assert_allclose(balance, net_force(now.posture, now.force)[:, 0], atol=3e-6)
         assert rates[2] == pytest.approx(total_power(now.velocity, now.force).item(), rel=1e-5)
 
@@ -45,8 +33,7 @@ def test_starts_are_admissible_and_their_motion_is_in_balance():
     for k in range(0, 9, 2):
         balance, _ = physics.balance_and_rates(np, phases[k], states[0, k], z[:, k], own[0], 0.01)
         assert np.abs(balance).max() < 1e-3
-    gait = ellipse(*own[0])
-    whole = replay(Chain(), Friction(), lambda t: (gait.angles(t), gait.rates(t)), 0.01 * 2 * np.pi)
+    whole = replay(Chain(), Friction(), ellipse(*own[0]), 0.01 * 2 * np.pi)
     assert states[1, -1] / states[2, -1] == pytest.approx(whole.efficiency, rel=1e-4)
 
 
@@ -70,20 +57,15 @@ def test_rows_about_published_results_judge_by_the_printed_digits():
 def test_the_swimmer_written_apart_has_the_small_strokes_of_a_closed_form():
     assert drag.displacement_per_area() == pytest.approx(5 / 243, rel=1e-6)
     # the connection does not depend on the heading, nor on the unit of drag
-    R, turned = (
-        drag.resistance(0.0, np.array([0.4, -0.9])),
-        drag.resistance(1.1, np.array([0.4, -0.9])),
-    )
-    np.testing.assert_allclose(np.linalg.eigvalsh(R), np.linalg.eigvalsh(turned), atol=1e-15)
+    one, turned = (drag.resistance(heading, np.array([0.4, -0.9])) for heading in (0.0, 1.1))
+    np.testing.assert_allclose(np.linalg.eigvalsh(one), np.linalg.eigvalsh(turned), atol=1e-15)
 
 
 def test_the_numbers_of_the_zoo_keep_their_problems_and_all_families_are_stated():
     lengths = "0.1712, 0.1186, 0.2235, 0.1596, 0.3273"
     paths = "periodic B-splines of degree 4, 24 knots, symmetry none, within 3.14"
-    known = (
-        f"links of lengths {lengths} from the tail [body lengths], friction (5.95461, 1, 1) {paths}"
-    )
-    assert described(zoo_problem(99)) == known
+    body = f"links of lengths {lengths} from the tail [body lengths]"
+    assert described(zoo_problem(99)) == f"{body}, friction (5.95461, 1, 1) {paths}"
     kinds = {type(law_problem(k).friction).__name__ for k in range(10)}
     assert kinds == {"Elliptic", "Viscous", "PowerLaw", "OwnLaw", "Friction"}
     assert law_problem(7).hash == law_problem(7).hash != law_problem(2).hash

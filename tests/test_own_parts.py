@@ -8,15 +8,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colloc import Objective, PathLimit, Polygon, Problem, ProblemError, Quantity, ellipse
+from colloc import (
+    Chain,
+    Harmonic,
+    Objective,
+    PathLimit,
+    Polygon,
+    Problem,
+    ProblemError,
+    Quantity,
+    ellipse,
+    load,
+    save,
+    solve,
+)
 from colloc.gaits import gait_fields
-from colloc.gaits.harmonic import Harmonic
 from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import DRIVEN_WORK
-from colloc.results.store import load, save
-from colloc.search.solve import solve
 
 DOCS = Path(__file__).resolve().parents[1] / "docs/howto"
 
@@ -27,11 +36,8 @@ def run(page, monkeypatch):
         monkeypatch.setattr(gait_fields, kinds, list(getattr(gait_fields, kinds)))
     module = types.ModuleType("own_parts")
     monkeypatch.setitem(sys.modules, "own_parts", module)
-    for block in re.findall(
-        r"^```python\n(.*?)^```",
-        (DOCS / page).read_text(encoding="utf-8"),
-        re.MULTILINE | re.DOTALL,
-    ):
+    text, multi = (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
+    for block in re.findall(r"^```python\n(.*?)^```", text, multi):
         exec(compile(block, page, "exec"), module.__dict__)
     return module
 
@@ -96,19 +102,16 @@ def moments_at(solution, t):
 def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
     heat = Quantity("heat", "sum(moment**2)", "loss in the windings")
     cool = Objective("distance / (work + 5 * heat)", name="coolness", quantities=[heat])
-    problem = Problem(
-        "cool", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), objective=cool, delta=1e-3
-    )
+    asked = {"gait": Harmonic(1, "bilateral"), "objective": cool, "delta": 1e-3}
+    problem = Problem("cool", ellipse(0.0, 2.8, 1.3), **asked)
     found = solve(problem, starts=1)
     assert found.status == "solved", found.message
     values, t = found.certificate.values, (np.arange(8000) + 0.3) / 8000
     # the heat is a fiftieth of what the distance is divided by, and that is replayed to 1e-6
-    assert values["heat"] == pytest.approx(
-        (moments_at(found, t)[0] ** 2).sum(axis=0).mean(), rel=5e-5
-    )
-    assert found.value == pytest.approx(
-        values["distance"] / (values["work"] + 5 * values["heat"]), rel=1e-5
-    )
+    mean = (moments_at(found, t)[0] ** 2).sum(axis=0).mean()
+    assert values["heat"] == pytest.approx(mean, rel=5e-5)
+    value = values["distance"] / (values["work"] + 5 * values["heat"])
+    assert found.value == pytest.approx(value, rel=1e-5)
     usual = solve(problem.with_(objective="efficiency"), starts=1)
     assert usual.efficiency > found.efficiency
     read = load(save(found, tmp_path / "cool.h5"))
@@ -139,10 +142,8 @@ def test_what_a_quantity_is_proportional_to_follows_from_its_formula():
     assert [each.pace_degree for each in (heat, effort, mixed)] == [0.0, 1.0, None]
     # what has a scale of its own is proportional to nothing, though beyond that scale it seems to
     # be
-    soft, gears = (
-        Quantity("soft", "sum(tanh((moment / 0.01)**2))"),
-        Quantity("gears", "sum(abs(rate) * where(abs(rate) > 17, 9, 1))"),
-    )
+    soft = Quantity("soft", "sum(tanh((moment / 0.01)**2))")
+    gears = Quantity("gears", "sum(abs(rate) * where(abs(rate) > 17, 9, 1))")
     assert soft.friction_degree is None
     assert gears.pace_degree is None
     assert Objective("distance * work / heat", quantities=[heat]).degree == -1.0
@@ -164,9 +165,8 @@ WEAK = Problem(
 
 def test_a_limit_of_your_own_is_kept_certified_stored_and_read(tmp_path):
     """On the sum of squared torques, which heats a motor: it binds here, and not elsewhere."""
-    problem = WEAK.with_(
-        torque_limit=None, limits=[PathLimit("heat", "sum(moment**2)", 0.005, both_ways=False)]
-    )
+    heat = PathLimit("heat", "sum(moment**2)", 0.005, both_ways=False)
+    problem = WEAK.with_(torque_limit=None, limits=[heat])
     found = solve(problem, starts=1)
     assert found.status == "solved", found.message
     moments, _ = moments_at(found, np.linspace(0, 1, 4001))

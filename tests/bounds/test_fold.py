@@ -87,9 +87,8 @@ def test_its_efficiency_is_462_over_1013():
 def missing(monkeypatch, delta):
     """How much less than the exact value the linear program finds at a finite regularisation."""
     monkeypatch.setattr(small_gaits, "_DELTA", delta)
-    return (
-        462 / 1013 - small_gaits.small_gait(Chain(), Friction(), np.array([np.pi, 0.0])).efficiency
-    )
+    found = small_gaits.small_gait(Chain(), Friction(), np.array([np.pi, 0.0]))
+    return 462 / 1013 - found.efficiency
 
 
 def test_the_linear_program_over_directions_finds_the_same_value(monkeypatch):

@@ -62,40 +62,26 @@ def test_a_kept_potential_is_the_one_that_was_found(found, tmp_path):
     domain, path = Domain(Chain(), Friction(), LIMIT), tmp_path / "potentials.json"
     path.write_text("[]")
     for more in (space, space.with_knots(np.array([1.9]))):
-        free = (
-            np.array(bound.coefficients)
-            if more is space
-            else np.random.default_rng(5).standard_normal(more.size)
-        )
+        free = np.random.default_rng(5).standard_normal(more.size)
         keep(Kept(domain, more, free, bound.floor), path)
         kept, motion = potentials(path)[-1], measure.motion
         assert (kept.domain, kept.program) == (domain, bound.floor)
-        ratios = [
-            Samples(each, motion).ratio(given)[0]
-            for each, given in ((more, free), (kept.space, kept.free))
-        ]
-        assert np.allclose(*ratios, atol=1e-12)
+        pairs = (more, free), (kept.space, kept.free)
+        ratios = [Samples(each, motion).ratio(given)[0] for each, given in pairs]
+        np.testing.assert_allclose(*ratios, atol=1e-12)
     assert len(potentials(path)) == 2
 
 
 def test_a_potential_is_checked_by_samples_that_were_not_chosen_for_it(found):
     space, bound, _ = found
-    domain, settings = (
-        Domain(Chain(), Friction(), LIMIT),
-        {"shapes": 20, "directions": 48, "starts": 100},
-    )
-    values = [
-        largest_ratio(domain, space, np.array(bound.coefficients), seed=seed, **settings)[0]
-        for seed in (1, 2)
-    ]
+    at = Domain(Chain(), Friction(), LIMIT), space
+    free, how = np.array(bound.coefficients), {"shapes": 20, "directions": 48, "starts": 100}
+    values = [largest_ratio(*at, free, seed=seed, **how)[0] for seed in (1, 2)]
     assert values[0] == pytest.approx(values[1], abs=2e-3)
     # four rounds were too few: what they missed shows
     assert min(values) > bound.floor
     # another potential is worse
-    assert (
-        largest_ratio(domain, space, 0.5 * np.array(bound.coefficients), **settings)[0]
-        > max(values) + 0.1
-    )
+    assert largest_ratio(*at, 0.5 * free, **how)[0] > max(values) + 0.1
 
 
 @pytest.mark.slow

@@ -83,12 +83,8 @@ def test_sums_over_few_joints_have_no_mixed_difference_in_more_and_miss_nothing(
         assert np.linalg.matrix_rank(basis.toarray()) == basis.shape[1]
         moved, difference = rng.uniform(-2, 2, q.shape), 0.0
         for corner in product((0, 1), repeat=together + 1):
-            mixed = np.where(
-                (np.arange(n_joint) < together + 1)[:, None]
-                & (np.resize(corner, n_joint)[:, None] > 0),
-                moved,
-                q,
-            )
+            moves = np.append(corner, np.zeros(n_joint - together - 1))[:, None] > 0
+            mixed = np.where(moves, moved, q)
             difference = difference + (-1) ** sum(corner) * (spline.matrix(mixed) @ basis).toarray()
         assert np.abs(difference).max() < 1e-12
 
@@ -162,10 +158,8 @@ def test_rows_are_the_gain_and_its_derivatives():
     free = 0.1 * np.random.default_rng(7).standard_normal(space.size)
     chosen, heading = np.arange(motion.size), np.random.default_rng(8).uniform(0, 6, motion.size)
     matrix, constant = samples.rows(chosen, heading)
-    gain = (
-        np.real(sum(np.exp(1j * k * heading) * a for k, a in samples.amplitudes(free).items()))
-        / motion.power
-    )
+    waves = (np.exp(1j * k * heading) * a for k, a in samples.amplitudes(free).items())
+    gain = np.real(sum(waves)) / motion.power
     np.testing.assert_allclose(matrix @ free + constant, gain, rtol=1e-10, atol=1e-12)
 
 
@@ -224,11 +218,8 @@ def test_a_bound_says_whether_the_last_climbs_still_found_more():
 
 @pytest.mark.slow
 def test_two_links_with_directed_friction_can_and_obey_the_coefficient_bound():
-    bound = efficiency_bound(
-        Chain((0.5, 0.5)),
-        Friction(mu_t=1.0, mu_f=1.0, mu_b=3.0),
-        budget=Budget(8, (0, 1), 32, 2, 3, 20),
-    )
+    law, budget = Friction(mu_t=1.0, mu_f=1.0, mu_b=3.0), Budget(8, (0, 1), 32, 2, 3, 20)
+    bound = efficiency_bound(Chain((0.5, 0.5)), law, budget=budget)
     assert 0.05 < bound.sampled < 1.0
 
 
@@ -305,9 +296,7 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     tiny = Budget(intervals=3, harmonics=(1,), shapes=6, directions=6, rounds=1, starts=10)
     cache = tmp_path / "bounds.sqlite"
     first = efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
-    monkeypatch.setattr(
-        "colloc.bounds.sampled.compute_bound", lambda *_: pytest.fail("not taken from the cache")
-    )
+    monkeypatch.setattr("colloc.bounds.sampled.compute_bound", None)
     assert efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache) == first
     assert "gap 0.1000" in first.report(first.sampled - 0.1)
     assert "not certified between" in first.report(0.3)
@@ -323,6 +312,14 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
         efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
 
 
+def moved(lengths, angles, rates, z, t):
+    """Where links begin and how they lie and turn, and the heading of the middle, a time t later."""
+    heading = z[2] * t + np.vstack([0 * z[:1], np.cumsum(angles + rates * t, axis=0)])
+    along, n = np.array(lengths)[:, None] * np.exp(1j * heading), len(lengths)
+    begin = (z[0] + 1j * z[1]) * t + np.cumsum(np.vstack([0 * along[:1], along[:-1]]), axis=0)
+    return begin, along, (heading[n // 2] + heading[(n - 1) // 2]) / 2
+
+
 @pytest.mark.parametrize("lengths", [(0.4, 0.6), (0.3, 0.4, 0.3), (0.1, 0.4, 0.3, 0.2)], ids=len)
 def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
     """The middle link's midpoint, or the middle joint along the mean heading there."""
@@ -333,12 +330,8 @@ def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
     motion = balanced_motion(body, Friction(), angles, rates, 1e-8)
 
     def middle(t):
-        heading = z[2] * t + np.concatenate([[np.zeros(20)], np.cumsum(angles + rates * t, axis=0)])
-        along = np.array(lengths)[:, None] * np.exp(1j * heading)
-        place, beside = along[: n // 2].sum(axis=0), heading[(n - 1) // 2]
-        return (z[0] + 1j * z[1]) * t + place + (n % 2) * along[n // 2] / 2, (
-            heading[n // 2] + beside
-        ) / 2
+        begin, along, heading = moved(lengths, angles, rates, z, t)
+        return begin[n // 2] + (n % 2) * along[n // 2] / 2, heading
 
     (before, turned_before), (after, turned), (_, heading) = middle(-h), middle(h), middle(0.0)
     velocity = (after - before) / (2 * h) * np.exp(-1j * heading)
@@ -350,23 +343,16 @@ def test_a_motion_is_that_of_the_middle_in_its_own_axes(lengths):
 def test_on_feet_the_centre_of_pressure_is_followed_and_no_faster_than_friction_pays_for(lengths):
     """From places of the feet a moment later; so no potential at all says 1/mu."""
     n, rng, h = len(lengths), np.random.default_rng(43), 1e-6
-    body = Chain(
-        lengths,
-        feet=(Foot(0, 0.2, weight=0.4), Foot(n - 1, 0.9, weight=0.3), Foot(n - 1, 0.1, weight=0.3)),
-    )
-    law = Friction(0.5, 0.5, 0.5)
+    pair = (Foot(n - 1, place, weight=0.3) for place in (0.9, 0.1))
+    body, law = Chain(lengths, feet=(Foot(0, 0.2, weight=0.4), *pair)), Friction(0.5, 0.5, 0.5)
     angles, rates = rng.uniform(-1, 1, (n - 1, 20)), rng.normal(size=(n - 1, 20))
     z = solve_balance(body, law, angles, rates, 1e-9).require().z
     motion = balanced_motion(body, law, angles, rates)
 
     def pressed(t):
-        heading = z[2] * t + np.concatenate([[np.zeros(20)], np.cumsum(angles + rates * t, axis=0)])
-        along = np.array(lengths)[:, None] * np.exp(1j * heading)
-        place = [
-            along[: foot.link].sum(axis=0) + foot.place * along[foot.link] for foot in body.feet
-        ]
-        middle = (heading[n // 2] + heading[(n - 1) // 2]) / 2
-        return (z[0] + 1j * z[1]) * t + np.array([0.4, 0.3, 0.3]) @ place, middle
+        begin, along, heading = moved(lengths, angles, rates, z, t)
+        places = [begin[foot.link] + foot.place * along[foot.link] for foot in body.feet]
+        return np.array([0.4, 0.3, 0.3]) @ places, heading
 
     velocity = (pressed(h)[0] - pressed(-h)[0]) / (2 * h) * np.exp(-1j * pressed(0.0)[1])
     np.testing.assert_allclose(motion.velocity[0] + 1j * motion.velocity[1], velocity, atol=1e-6)
@@ -374,9 +360,8 @@ def test_on_feet_the_centre_of_pressure_is_followed_and_no_faster_than_friction_
 
 
 def test_on_two_feet_a_link_the_bound_lies_between_the_best_small_gait_and_friction_alone():
-    bound = efficiency_bound(
-        Chain(feet=2), Friction(), 1.0, budget=Budget(4, (1,), 8, 16, 4, starts=60, tolerance=0.01)
-    )
+    budget = Budget(4, (1,), 8, 16, 4, starts=60, tolerance=0.01)
+    bound = efficiency_bound(Chain(feet=2), Friction(), 1.0, budget=budget)
     assert small_gait(Chain(feet=2), Friction(), np.zeros(2)).efficiency < bound.sampled < 0.75
 
 
@@ -390,17 +375,12 @@ def test_climbs_go_along_creases_where_one_joint_rests():
     """A crease in the rate of joint 2: only steps that leave it at rest stay there."""
     domain = Domain(Chain((0.25,) * 4), Friction(), 2.5)
     lattice = domain.lattice(4, 10, 0.2)
-    start = lattice.take(
-        np.flatnonzero((lattice.rates[1] == 0) & (lattice.rates[0] * lattice.rates[2] != 0))[:40]
-    )
+    first, rests, last = lattice.rates
+    start = lattice.take(np.flatnonzero((rests == 0) & (first * last != 0))[:40])
 
     def crease(motion: CoulombMotion) -> np.ndarray:
-        turn = np.arctan2(motion.rates[2], motion.rates[0])
-        return (
-            -30 * np.abs(motion.rates[1])
-            + np.cos(2 * (turn - 0.4))
-            - ((motion.angles - 0.3) ** 2).sum(axis=0)
-        )
+        turn, beside = np.arctan2(motion.rates[2], motion.rates[0]), np.abs(motion.rates[1])
+        return np.cos(2 * (turn - 0.4)) - 30 * beside - ((motion.angles - 0.3) ** 2).sum(axis=0)
 
     top = domain.summits(crease, start, 0.5, 0.3, 40, np.random.default_rng(19))
     assert np.median(crease(top)) > 0.99
@@ -412,17 +392,10 @@ def test_climbs_go_along_creases_where_one_joint_rests():
     ids=["drag", "smooth"],
 )
 def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_path):
-    usual = {
-        "guess": None,
-        "body": Chain(),
-        "friction": Friction(),
-        "gait": Harmonic(1, "antipodal"),
-    }
-    problem = Problem("other", **(usual | changes))
+    problem = Problem("other", gait=Harmonic(1, "antipodal"), **changes)
     assert upper_bound(problem, tmp_path, compute=False) is None
-    with pytest.raises(
-        ProblemError, match="chains of links under Coulomb friction, or the elliptic law, only"
-    ):
+    said = "chains of links under Coulomb friction, or the elliptic law, only"
+    with pytest.raises(ProblemError, match=said):
         upper_bound(problem, tmp_path, compute=True)
 
 
@@ -430,13 +403,7 @@ def test_a_tighter_bound_is_offered_where_one_can_be_computed_and_nowhere_else(
     tmp_path, monkeypatch
 ):
     monkeypatch.setattr("colloc.bounds.sampled.efficiency_bound", lambda *domain, cache: "computed")
-    for body in (
-        Chain(),
-        Chain((0.2,) * 5),
-        Chain((1 / 6,) * 6),
-        Chain((1 / 9,) * 9),
-        ModalBody(2),
-    ):
+    for body in (*(Chain((1 / n,) * n) for n in (3, 5, 6, 9)), ModalBody(2)):
         problem = Problem("other", body=body, gait=Harmonic(1, "antipodal"))
         try:
             computed = upper_bound(problem, tmp_path, compute=True) == "computed"

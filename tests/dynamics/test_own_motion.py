@@ -93,19 +93,11 @@ class Pushed(Regime):
         ran, values, errors = to_tolerance(run, tolerance, objective, tolerance, totals)
         t = ran.phases % 1.0
         solved, _ = gait.balanced(t)
-        return Replay(
-            values=values,
-            errors=errors,
-            others={},
-            lever=1.0,
-            actuator_work=float(ran.states[4, -1]),
-            residual=float(solved.residual.max()),
-            error=float(objective.relative_error(values, errors)),
-            several=0.0,
-            instants=t.size,
-            tail=(t, solved.z),
-            objective=objective,
-        )
+        found = {"values": values, "errors": errors, "tail": (t, solved.z), "instants": t.size}
+        found |= {"actuator_work": float(ran.states[4, -1]), "objective": objective}
+        found |= {"residual": float(solved.residual.max()), "others": {}, "several": 0.0}
+        error = float(objective.relative_error(values, errors))
+        return Replay(**found, error=error, lever=1.0)
 
 
 class Gait:
@@ -122,10 +114,8 @@ class Gait:
     def rates(self, t, state, near):
         solved, now = self.balanced(np.array([t]), near)
         moved = np.exp(1j * state[0]) * complex(*now.centre[:, 0])
-        spent = now.power[0] - self.push * now.centre[0, 0]
-        return np.array(
-            [now.z[2, 0], moved.real, moved.imag, now.actuator_power[0], spent]
-        ), solved.z
+        powers = now.actuator_power[0], now.power[0] - self.push * now.centre[0, 0]
+        return np.array([now.z[2, 0], moved.real, moved.imag, *powers]), solved.z
 
     def run(self, error):
         return integrate_period(self.rates, np.zeros(5), error, longest=4e-3)

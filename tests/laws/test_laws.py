@@ -16,9 +16,8 @@ from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.smooth_body import accurate_motion
 
 LENGTHS = Chain().length_column()
-OWN = OwnLaw(
-    "-where(vs > 0, 1, 1.5)*vs/speed * (1 + 0.5*exp(-speed))", "-2*vn/speed * (1 + 0.5*exp(-speed))"
-)
+WEAKER = "/speed * (1 + 0.5*exp(-speed))"
+OWN = OwnLaw(f"-where(vs > 0, 1, 1.5)*vs{WEAKER}", f"-2*vn{WEAKER}")
 EVERY = [
     Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5),
     Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.5),
@@ -201,13 +200,10 @@ def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_l
 
 
 def test_sliding_straight_the_elliptic_law_is_coulomb_friction():
+    one, other = (law(mu_t=2, mu_f=1, mu_b=5) for law in (Elliptic, Friction))
     for vs, vn in ((2.0, 0.0), (-2.0, 0.0), (0.0, 3.0)):
         at = np.array([[vs]]), np.array([[vn]]), 1e-12
-        np.testing.assert_allclose(
-            Elliptic(mu_t=2, mu_f=1, mu_b=5).density(*at),
-            Friction(mu_t=2, mu_f=1, mu_b=5).density(*at),
-            rtol=1e-14,
-        )
+        np.testing.assert_allclose(one.density(*at), other.density(*at), rtol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -44,12 +44,7 @@ def test_parts_are_finished_until_their_inputs_change(tmp_path):
 
 def test_source_closure_follows_imports():
     found = source_closure("scripts.paper.three_link")
-    led_to = {
-        "colloc.mechanics.fixed_point",
-        "colloc.mechanics.friction",
-        "scripts.models.ellipses",
-    }
-    assert led_to <= found.keys()
+    assert {"colloc.mechanics.fixed_point", "scripts.models.ellipses"} <= found.keys()
     assert not {"scripts.paper.figures", "scripts.paper.study"} & found.keys()
 
 

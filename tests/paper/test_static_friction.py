@@ -84,11 +84,8 @@ class TestFlapBody:
     body = FlapBody()
 
     def test_geometry_against_plain_trigonometry(self):
-        angles, rates, z = (
-            np.array([[0.4], [-0.9]]),
-            np.array([[1.3], [0.2]]),
-            np.array([[0.3], [-0.2], [0.7]]),
-        )
+        angles, rates = np.array([[0.4], [-0.9]]), np.array([[1.3], [0.2]])
+        z = np.array([[0.3], [-0.2], [0.7]])
         velocity = self.body.velocity(self.body.posture(angles), rates, z)
         for flap in (0, 1):
             a, w = angles[flap, 0], rates[flap, 0] + 0.7

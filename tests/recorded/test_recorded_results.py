@@ -110,10 +110,8 @@ def corners():
 def objectives_and_small_delta():
     numbers = []
     for objective in ("turning", "driven efficiency", "distance / length"):
-        stated = Problem(
-            "x", None, Chain(), UNEQUAL, objective=objective, rotation=None, delta=1e-2
-        )
-        known = colloc.evaluate(stated.with_(mesh_tolerance=1e-3), SKEW).certificate
+        asked = {"objective": objective, "rotation": None, "delta": 1e-2, "mesh_tolerance": 1e-3}
+        known = colloc.evaluate(Problem("x", None, Chain(), UNEQUAL, **asked), SKEW).certificate
         numbers += [known.value, known.value_at_zero_delta]
     return numbers
 

@@ -105,15 +105,8 @@ def test_meshes_are_held_against_a_motion_whose_error_is_known_where_friction_ha
 
 ELLIPSE = [[0.0, 0.0], [[2.0], [-2.0]], [[1.0], [1.0]]]
 TRUE = Played(0.05, 0.1, 2.0, 0.0, 100, 1e-9)
-ROW = {
-    "number": 0,
-    "gait": ELLIPSE,
-    "claimed": 0.05,
-    "ambiguity": 0.0,
-    "efficiency": [0.05, 1e-7],
-    "distance": [0.1, 1e-7],
-    "work": [2.0, 1e-7],
-}
+ROW = {"number": 0, "gait": ELLIPSE, "claimed": 0.05, "ambiguity": 0.0}
+ROW |= {"efficiency": [0.05, 1e-7], "distance": [0.1, 1e-7], "work": [2.0, 1e-7]}
 
 
 def test_gaits_played_together_are_those_played_alone():
