@@ -429,7 +429,7 @@ froude=0.1, gait=Polygon(4) -> leaves the pace open
 froude=0.1, body=ModalBody(), gait=Harmonic(1) -> of a ModalBody
 froude=0.1, gait=Harmonic(1), grade=0.1, rotation=1.0 -> on a slope a body that a period turns
 froude=0.1, gait=Harmonic(1), grade=2.0 -> slides down for ever
-froude=0.1, gait=Harmonic(1), objective="driven efficiency" -> single joints
+froude=0.1, gait=Polygon(4), objective="driven efficiency" -> joint rates jump
 froude=0.1, gait=Harmonic(1), scheme="lobatto-4" -> gauss-N
 froude=0.1, gait=Harmonic(1), formulation="implicit velocity" -> only the formulation
 froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(3, "antipodal") -> own axis of symmetry

@@ -22,7 +22,7 @@ from colloc.gaits.regime import Regime
 from colloc.mechanics.balance import Moving, joint_moments
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.densities import Instants, PathLimits
+from colloc.mechanics.densities import Instants, PathLimits, Quantity
 from colloc.mechanics.fixed_point import motion_and_derivatives, solve_balance
 from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.inertia import (
@@ -189,9 +189,9 @@ def torque_function(body: Chain, friction: Law) -> Any:
 
 
 @lru_cache(maxsize=32)
-def limit_shares(body: Chain, friction: Law, limits: PathLimits) -> Any:
-    """CasADi functions (y, delta) to shares of limits, ``(n_share, n_time)``, and to their
-    derivatives along y = (q, r, q'', momenta, Froude number), row by row."""
+def of_torques(body: Chain, friction: Law, formula: Quantity | PathLimits) -> Any:
+    """CasADi functions (y, delta) to a density, or to shares of limits, ``(n_row, n_time)``, and to
+    the derivatives along y = (q, r, q'', momenta, Froude number), row by row."""
     import casadi as ca
 
     n = body.n_joint
@@ -199,7 +199,7 @@ def limit_shares(body: Chain, friction: Law, limits: PathLimits) -> Any:
     q, r, accelerations, momenta, froude = parts = [ca.SX.sym(*each) for each in sizes]
     y, delta = ca.vertcat(*parts), ca.SX.sym("delta")
     moments = torque_function(body, friction)(q, r, accelerations, momenta, delta, froude)
-    out = limits.at(Instants(body, friction, q, r, delta, moments=moments))
+    out = formula.at(Instants(body, friction, q, r, delta, moments=moments))
     slope = ca.vec(ca.densify(ca.jacobian(out, y).T))
-    values = ca.Function("shares", [y, delta], [out], {"cse": True})
-    return values, ca.Function("share_slopes", [y, delta], [slope], {"cse": True})
+    values = ca.Function("values", [y, delta], [out], {"cse": True})
+    return values, ca.Function("slopes", [y, delta], [slope], {"cse": True})

@@ -23,7 +23,6 @@ from colloc.numerics.schemes import scheme
 from colloc.system.arguments import is_number
 from colloc.system.errors import ProblemError
 
-_TIMED = {"distance", "work", "rotation", "period"}
 _ON_SLOPE = 0.02, 0.2 * DELTA_START
 """First delta of a search, also where it is relative to the shape speed: with more regularisation
 the body creeps down faster than it crawls up."""
@@ -199,7 +198,8 @@ class Regime:
 
     def _check_inertia(self, problem: Any) -> None:
         gaits = problem.gait
-        if self.free and not set(problem.objective.uses) & _TIMED:
+        of_shapes = {each.name for each in problem.objective.integrals if not each.needs_forces}
+        if self.free and of_shapes.issuperset(problem.objective.uses):
             raise ProblemError(
                 f"a free pace needs an objective that depends on it, as distance and work do, not "
                 f"{problem.objective.name!r}."
@@ -220,16 +220,12 @@ class Regime:
                 f"gaits of symmetry {gaits.symmetry} run backwards in half of their period, as "
                 f"nothing with inertia does: take symmetry {ANTIPODAL!r} or {NONE!r}."
             )
-        if any(each.needs_forces for each in problem.integrals):
-            raise ProblemError(
-                "the work of single joints with inertia is not known yet: leave driven work out."
-            )
-        if not problem.path_limits.needs_forces:
+        if not any(each.needs_forces for each in (problem.path_limits, *problem.integrals)):
             return
         if gaits.relative_delta:
             raise ProblemError(
-                "with inertia torques are infinite where joint rates jump: limit them for gaits of "
-                "a smooth class, such as Harmonic or BSpline."
+                "with inertia torques are infinite where joint rates jump: take gaits of a smooth "
+                "class, such as Harmonic or BSpline."
             )
         t, step, n_joint = np.array([0.123, 0.456]), 1e-6, problem.body.n_joint
         after, before = (gaits.angle_matrix(t + by, n_joint, 1) for by in (step, -step))

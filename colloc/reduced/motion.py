@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.dynamics.chain import limit_shares
+from colloc.dynamics.chain import of_torques
 from colloc.dynamics.collocated import CollocatedPose, point_weights, stage_weights
 from colloc.dynamics.dynamics import (
     OMEGA,
@@ -121,10 +121,9 @@ class ReducedMotion:
         s = self.at(v, delta)
         if not s.values:
             s.values = self.kind.totals(s.passed)
-            if self._integrals:
-                now = self._instants(s)
-                weight = self.kind.periods * s.shapes.pace * self._point_weight
-                s.values |= {each.name: float(each.at(now)[0] @ weight) for each in self._integrals}
+            weight = self.kind.periods * s.shapes.pace * self._point_weight
+            for each in self._integrals:
+                s.values[each.name] = float(self._at_points(each, s)[0] @ weight)
         return s.values
 
     def shares(
@@ -133,11 +132,8 @@ class ReducedMotion:
         """Shares of actuator limits ``(n_share, n_time)`` at the points of the mesh, or at times of
         it."""
         kind = self.kind
-        if limits.needs_forces and isinstance(kind, Inertial):
-            y = self._torque_arguments(kind, self.at(v, delta), t)
-            return np.asarray(limit_shares(kind.chain, kind.law, limits)[0](y, delta).full())
-        if t is None:
-            return np.asarray(limits.at(self._instants(self.at(v, delta))))
+        if t is None or self._of_torques(limits):
+            return self._at_points(limits, self.at(v, delta), t)
         theta = np.zeros(t.size)  # where it is no state
         if "theta" in kind.states:
             k, tau = self._places(t)
@@ -151,35 +147,52 @@ class ReducedMotion:
     ) -> np.ndarray:
         """Derivatives ``(n_row, n)`` of shares of actuator limits; `rows` ``(2, n_row)`` are their
         shares and points."""
-        s, kind, (share, point) = self.at(v, delta), self.kind, rows
-        n_row, n_point, n = share.size, self.mesh.n_point, len(s.shapes.angles)
-        inertial = limits.needs_forces and isinstance(kind, Inertial)
-        if inertial:
-            assert isinstance(kind, Inertial)
-            y = self._torque_arguments(kind, s)
-            slopes = limit_shares(kind.chain, kind.law, limits)[1](y[:, point], delta).full()
-            slopes = np.asarray(slopes).reshape(-1, len(y), n_row)
+        s, (share, point) = self.at(v, delta), rows
+        n_row, n_point = share.size, self.mesh.n_point
+        if inertial := self._of_torques(limits):
+            y = self._torque_arguments(s)[:, point]
+            slopes = inertial[1](y, delta).full().reshape(-1, len(y), n_row)
         else:
             slopes = density_slopes(limits, self._instants(s).chosen(point))
         at_points = np.zeros((n_row, slopes.shape[1], n_point))
         at_points[np.arange(n_row), :, point] = slopes[share, :, np.arange(n_row)]
+        if inertial:
+            return self._through_torques(s, at_points)
         no_pace = np.zeros((n_row, n_point))
-        totals = [TotalGradient()] * n_row
-        if not inertial:
-            if not at_points[:, -1].any():
-                return self._space.vjp(v, at_points[:, :-1].transpose(0, 2, 1), no_pace)
-            return self._through(s, totals, at_points, no_pace)
+        if not at_points[:, -1].any():
+            return self._space.vjp(v, at_points[:, :-1].transpose(0, 2, 1), no_pace)
+        return self._through(s, [TotalGradient()] * n_row, at_points, no_pace)
+
+    def _of_torques(self, formula: Any) -> Any:
+        """Functions of a formula that speaks of forces that accelerate links, too, or None."""
+        if formula.needs_forces and isinstance(self.kind, Inertial):
+            return of_torques(self.kind.chain, self.kind.law, formula)
+        return None
+
+    def _at_points(self, formula: Any, s: _State, t: np.ndarray | None = None) -> np.ndarray:
+        """Values of a formula ``(n_row, n_point)``; with torques also at times of the mesh."""
+        if found := self._of_torques(formula):
+            return np.asarray(found[0](self._torque_arguments(s, t), s.delta).full())
+        return np.asarray(formula.at(self._instants(s)))
+
+    def _through_torques(self, s: _State, at_points: np.ndarray) -> np.ndarray:
+        """Derivatives ``(m, n)`` of numbers that depend on `_torque_arguments` at the points, ``(m,
+        n_argument, n_point)``."""
+        kind: Any = self.kind
+        m, n = len(at_points), len(s.shapes.angles)
         on_shape, on_accelerations, on_states, on_froude = np.split(
             at_points, [2 * n, 3 * n, 3 * n + len(STATES)], axis=1
         )
-        by_states = np.zeros((n_row, len(kind.states), n_point))
+        by_states = np.zeros((m, len(kind.states), self.mesh.n_point))
         by_states[:, : len(STATES)] = on_states
+        totals = [TotalGradient()] * m
         if kind.regime.free:  # Fr = exp(-2 log_period)
-            on_log_period = (-2.0 * y[-1] * on_froude[:, 0]).sum(axis=1)
+            froude = kind.froude_at(s.shapes, s.passed.static)
+            on_log_period = -2.0 * froude * on_froude.sum(axis=(1, 2))
             totals = [TotalGradient(static=value) for value in on_log_period]
-        on_points = np.concatenate([on_shape, no_pace[:, None]], axis=1)
-        through = self._through(s, totals, on_points, no_pace, by_states)
-        return through + self._space.accelerations_vjp(v, on_accelerations)
+        on_points = np.pad(on_shape, ((0, 0), (0, 1), (0, 0)))
+        through = self._through(s, totals, on_points, np.zeros((m, 1)), by_states)
+        return through + self._space.accelerations_vjp(s.v, on_accelerations)
 
     def _places(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Intervals of times of the mesh, and fractions of them."""
@@ -187,10 +200,9 @@ class ReducedMotion:
         k = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, self.mesh.n - 1)
         return k, (t - edges[k]) / self.mesh.h[k]
 
-    def _torque_arguments(
-        self, kind: Inertial, s: _State, t: np.ndarray | None = None
-    ) -> np.ndarray:
+    def _torque_arguments(self, s: _State, t: np.ndarray | None = None) -> np.ndarray:
         """(angles, rates, accelerations, momenta, Froude number) that joint torques depend on."""
+        kind: Any = self.kind
         mesh, (angles, rates, *_) = self.mesh, s.shapes
         momenta = s.along.states[: len(STATES)]
         if t is not None:
@@ -211,16 +223,21 @@ class ReducedMotion:
         """Derivatives of `values`, ``(n,)`` each."""
         s, kind = self.at(v, delta), self.kind
         totals, weight, pace = kind.total_gradients(s.passed), self._point_weight, s.shapes.pace
-        gradients = [*totals.values(), *[TotalGradient()] * len(self._integrals)]
+        integrals = [each for each in self._integrals if not self._of_torques(each)]
+        gradients = [*totals.values(), *[TotalGradient()] * len(integrals)]
         on_points = np.zeros((len(gradients), 2 * len(s.shapes.rates) + 1, weight.size))
         on_pace = np.zeros((len(gradients), weight.size))
-        now = self._instants(s) if self._integrals else None
-        for row, quantity in enumerate(self._integrals, len(totals)):
-            assert now is not None
+        for row, quantity in enumerate(integrals, len(totals)):
+            now = self._instants(s)
             on_points[row] = kind.periods * weight * pace * density_slopes(quantity, now)[0]
             on_pace[row] = kind.periods * weight * quantity.at(now)[0]
-        found = self._through(s, gradients, on_points, on_pace)
-        return dict(zip((*totals, *(each.name for each in self._integrals)), found, strict=True))
+        rows = self._through(s, gradients, on_points, on_pace)
+        found = dict(zip((*totals, *(each.name for each in integrals)), rows, strict=True))
+        for each in self._integrals:
+            if each.name not in found:
+                slopes = self._of_torques(each)[1](self._torque_arguments(s), delta).full()
+                found[each.name] = self._through_torques(s, kind.periods * weight * slopes[None])[0]
+        return found
 
     def _through(
         self,

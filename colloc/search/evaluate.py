@@ -197,7 +197,7 @@ def _errors_of_samples(
     # where the gait of the answer begins
     later = math.atan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * math.pi)
     phases, wide = answer.mesh.times + later, Harmonic(highest)
-    functions = np.stack([wide.functions(phases), wide.functions(phases, 1)])
+    functions = np.stack([wide.functions(phases, derivative) for derivative in range(3)])
     aims, delta = control.aims, answer.problem.delta
     shapes = _Series(functions, answer.problem.joint_map)
     motion = ReducedMotion(control.dynamics, answer.mesh, shapes, aims.integrals)
@@ -230,14 +230,14 @@ def _errors_of_samples(
 
 
 class _Series(NamedTuple):
-    """Fourier series by their coefficients, on the points of a mesh; `functions` ``(2, 2 K + 1,
+    """Fourier series by their coefficients, on the points of a mesh; `functions` ``(3, 2 K + 1,
     n_point)`` are the basis and its derivatives."""
 
     functions: np.ndarray
     joint_map: JointMap | None = None
 
     def at(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        angles, rates = v.reshape(-1, self.functions.shape[1]) @ self.functions
+        angles, rates = v.reshape(-1, self.functions.shape[1]) @ self.functions[:2]
         if self.joint_map is not None:
             angles, rates = self.joint_map.joint_angles(angles), self.joint_map.joint_rates(rates)
         return angles, rates, np.ones(self.functions.shape[2])
@@ -246,4 +246,10 @@ class _Series(NamedTuple):
         both = on_shape.reshape(*on_shape.shape[:2], 2, -1)
         if self.joint_map is not None:
             both = both @ self.joint_map.matrix
-        return np.einsum("ktdj,dwt->kjw", both, self.functions).reshape(len(both), -1)
+        return np.einsum("ktdj,dwt->kjw", both, self.functions[:2]).reshape(len(both), -1)
+
+    def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
+        return v.reshape(-1, self.functions.shape[1]) @ self.functions[2]
+
+    def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
+        return np.einsum("kjt,wt->kjw", on_points, self.functions[2]).reshape(len(on_points), -1)

@@ -25,7 +25,7 @@ is that of a slope. With inertia the momenta P of the body take the place of N a
     P = (sum m_i v_i in the tail's axes, sum J_i w_i + m_i x_i x v_i)
     P' = (sum f_i + m_i g, sum c_i + x_i x f_i) / Fr + turning of the axes        collocated
 
-with x_i the midpoints seen from the centre of mass; where torques are limited they follow from
+with x_i the midpoints seen from the centre of mass; where torques count they follow from
 q'', variables too, and the momenta (`colloc.dynamics.chain`). Other bodies, and the formulation
 "implicit velocity", have shape coordinates q, rates r and tail velocity z as variables, and z =
 Z(q, r), the velocity that balances them, in place of friction and balance

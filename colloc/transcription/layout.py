@@ -3,11 +3,12 @@ from a gait, through the balance solver."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from colloc.dynamics.chain import torque_function
 from colloc.dynamics.collocated import CollocatedPose, point_weights, stage_weights, sums
 from colloc.dynamics.control_problem import ControlProblem
 from colloc.dynamics.dynamics import OMEGA, PeriodTotals, Shapes
@@ -95,6 +96,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
     contacts = len(body.contact.force_names) if isinstance(body, Chain) else 0
     balanced, moved = (0, lifted) if inertial else (lifted, 0)
     mapped = mesh.n_point - lifted
+    forced = [control.actuators.needs_forces, *(x.needs_forces for x in control.aims.integrals)]
     sizes = {
         "parameters": (gait.size(n_joint), 1),
         "static": (len(dynamics.static_parameters), 1),
@@ -103,7 +105,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
         "work": (1, mesh.n + 1),
         "totals": (len(control.aims.integrals), 1),
         "momenta": (len(STATES) * inertial, mesh.n_site),
-        "accelerations": (n_joint, moved * control.actuators.needs_forces),
+        "accelerations": (n_joint, moved * any(forced)),
         **dict.fromkeys(("directions", "spins", "vx", "vy"), (n_joint + 1, lifted)),
         "friction": (contacts, lifted),
         "speed": (1, lifted * gait.relative_delta),
@@ -140,7 +142,7 @@ def balanced_variables(
 ) -> np.ndarray:
     """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
     gaits, n_joint = control.admissible.gait, control.admissible.n_joint
-    kind = control.dynamics.in_speeds_of(RADIANS)
+    kind: Any = control.dynamics.in_speeds_of(RADIANS)
     x = np.zeros(layout.n)
     x[layout.decisions] = parameters
     parameters, begin = np.split(parameters, [len(layout.parameters)])
@@ -175,14 +177,17 @@ def balanced_variables(
     x[layout.theta[0, mesh.sites]] = theta_0 + pose.stage_theta
     x[layout.theta[0, mesh.edge_sites]] = theta_0 + pose.theta
     at = kind.instants(shapes, pose.theta_on(mesh), along.now.z)
-    for quantity, total in zip(layout.integrals, layout.totals, strict=True):
-        x[total] = (weight * (speed * quantity.at(at))[0, points]).sum()
     if layout.momenta.size:
         x[layout.momenta[:, mesh.sites]] = along.states[: len(layout.momenta), points]
         x[layout.momenta[:, mesh.edge_sites]] = along.edges
     if layout.accelerations.size:
         matrix = gaits.angle_matrix(mesh.times, n_joint, 2) / RADIANS**2
         x[layout.accelerations] = (matrix @ parameters).T
+        torques, froude = torque_function(kind.body, kind.law), kind.froude_at(shapes, begin)
+        y = angles, rates, x[layout.accelerations], along.states[: len(layout.momenta)]
+        at = replace(at, moments=torques(*y, slow, froude).full())
+    for quantity, total in zip(layout.integrals, layout.totals, strict=True):
+        x[total] = (weight * (speed * quantity.at(at))[0, points]).sum()
     if layout.z.size:
         x[layout.angles], x[layout.rates], x[layout.z] = angles, rates, z
         return x

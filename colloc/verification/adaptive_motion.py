@@ -90,9 +90,9 @@ def totals_along(
 def whole_totals(
     quantities: Iterable[Quantity], path: Path
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Quantities of shapes and rates alone over a period, and their errors."""
+    """Those of quantities that need no forces over a period, and their errors."""
     values, errors = {}, {}
-    for each in quantities:
+    for each in [each for each in quantities if not each.needs_forces]:
         value, rougher = (
             float(totals_along(each, path, np.zeros(1), np.ones(1), pieces)[0])
             for pieces in _PIECES

@@ -17,7 +17,7 @@ shooting: Adams' and Gear's methods, and Newton's on the map of a period.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
@@ -45,7 +45,7 @@ from colloc.mechanics.inertia import checked_mass, kinetic_energy, momenta, tail
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.system.arguments import MOST_PERIODS, check_count, check_finite
-from colloc.system.errors import NotConvergedError
+from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.adaptive_motion import (
     PANEL_RULE,
     Numbers,
@@ -75,6 +75,9 @@ _USUAL = 0.125
 20."""
 _MOST_STEPS = 30
 _OTHER = 1e-2  # momenta [body lengths per period] by which two motions differ that are not one
+_KINK, _NARROWEST = 1e-3, 1e-9
+"""Least part of the period that a panel's error is held against, as kinks are few; least width."""
+_END = np.ones(1)
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 _Breaks = np.ndarray | tuple[float, ...]
 
@@ -90,6 +93,45 @@ def _through_periods(
     phases = np.concatenate([k + course.phases for k, course in enumerate(courses)])
     states = np.concatenate([course.states for course in courses], axis=1)
     return phases, states, np.stack(ends, axis=1)
+
+
+def _forced(quantities: Iterable[Quantity]) -> list[Quantity]:
+    return [each for each in dict.fromkeys(quantities) if each.needs_forces]
+
+
+def _sums(
+    seen: Callable[[np.ndarray], Instants],
+    quantities: list[Quantity],
+    steps: np.ndarray,
+    aim: float,
+    ends: np.ndarray,
+) -> np.ndarray:
+    """Quantities of what is seen up to ascending phases, ``(k, n)``: by Gauss quadrature between
+    steps, which are halved where that changes more than an error, as at kinks of a power."""
+    found = np.zeros((len(quantities), ends.size + 1))
+    if not quantities:
+        return found[:, 1:]
+
+    def gained(edges: np.ndarray, h: np.ndarray) -> np.ndarray:
+        now = seen((edges[:, None] + h[:, None] * PANEL_RULE.c).ravel())
+        densities = np.stack([each.at(now).reshape(h.size, -1) for each in quantities])
+        return np.asarray(h * (densities @ PANEL_RULE.b))
+
+    edges = np.union1d(np.union1d(steps, ends), 0.0)
+    left, h = edges[:-1], np.diff(edges)
+    whole = gained(left, h)
+    while left.size:
+        left, h = (left[:, None] + h[:, None] * [0.0, 0.5]).ravel(), np.repeat(0.5 * h, 2)
+        parts = gained(left, h)
+        both = parts[:, ::2] + parts[:, 1::2]
+        off = np.abs(both - whole).max(axis=0) > aim * np.maximum(2 * h[::2], _KINK)
+        off &= h[::2] > _NARROWEST
+        upto = np.searchsorted(ends, left[::2], side="right")
+        for row, part in zip(found, both, strict=True):
+            np.add.at(row, upto[~off], part[~off])
+        again = np.repeat(off, 2)
+        left, h, whole = left[again], h[again], parts[:, again]
+    return np.cumsum(found, axis=1)[:, :-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,18 +228,13 @@ class GaitOnSlope:
         solved = solve_balance(*at, load=load)
         return Instants(*at, z=solved.z, load=load), solved.residual
 
-    def totals(self, ran: Course, quantities: Sequence[Quantity], ends: np.ndarray) -> np.ndarray:
-        """Quantities up to ascending phases, ``(k, n)``, by Gauss quadrature between the solver's
-        steps."""
-        if not quantities:
-            return np.empty((0, ends.size))
-        edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
-        h = np.diff(edges)
-        t = (edges[:-1, None] + h[:, None] * PANEL_RULE.c).ravel()
-        now, _ = self.instants(t, ran.at(t)[0])
-        parts = [h * (each.at(now)[0].reshape(h.size, -1) @ PANEL_RULE.b) for each in quantities]
-        sums = np.concatenate([np.zeros((len(parts), 1)), np.cumsum(parts, axis=1)], axis=1)
-        return sums[:, np.searchsorted(edges, ends)]
+    def totals(
+        self, ran: Course, aim: float, quantities: Iterable[Quantity], ends: np.ndarray = _END
+    ) -> np.ndarray:
+        """Those of quantities that need forces up to ascending phases, ``(k, n)``, to an error."""
+        return _sums(
+            lambda t: self.instants(t, ran.at(t)[0])[0], _forced(quantities), ran.phases, aim, ends
+        )
 
     def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
         """Part of the time at which several motions are balanced."""
@@ -313,8 +350,8 @@ def slope_replay(
     """A period of a gait that says where it points, with the arguments of `colloc.replay`: the
     distance is the way in the direction that counts, the work that of the joints."""
     asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
-    with_forces = [each for each in asked if each.needs_forces]
-    totals = whole_totals([each for each in asked if not each.needs_forces], gait)
+    with_forces = _forced(asked)
+    totals = whole_totals(asked, gait)
     on = GaitOnSlope(body, friction, gait, delta, slope.grade, breaks)
 
     def run(aim: float) -> tuple[tuple[Course, float], Numbers]:
@@ -322,7 +359,7 @@ def slope_replay(
         theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
         way, work = slope.travel_along(complex(climb, aside)), float(spent + slope.grade * climb)
         numbers = {"distance": way.real, "work": work, "rotation": float(theta)}
-        sums = on.totals(ran, with_forces, np.ones(1))[:, 0].tolist()
+        sums = on.totals(ran, aim, with_forces)[:, 0].tolist()
         names = (each.name for each in with_forces)
         return (ran, way.imag), numbers | dict(zip(names, sums, strict=True))
 
@@ -373,11 +410,12 @@ class InertialMotion(Period):
 
 
 class RoughPeriod(NamedTuple):
-    """A period that leaves the momenta as they are, but for `_rough`."""
+    """A period that leaves the momenta as they are, but for `_rough`. What k quantities sum up to
+    counts as states, too."""
 
     momenta: np.ndarray  # at the start, (3,)
-    ends: np.ndarray  # states at the start and the end, (7, 2)
-    slopes: np.ndarray  # of the states at the end by the momenta at the start, (7, 3)
+    ends: np.ndarray  # states at the start and the end, (7 + k, 2)
+    slopes: np.ndarray  # of the states at the end by the momenta at the start, (7 + k, 3)
 
 
 class PeriodicRun(NamedTuple):
@@ -388,10 +426,12 @@ class PeriodicRun(NamedTuple):
     """At the start of one that would close the gap that is left: where a body glides far they are
     much further away than the gap is wide."""
     aim: float
+    sums: np.ndarray = np.empty(0)  # of quantities, (k,)
 
     @property
     def ends(self) -> np.ndarray:
-        return self.course.states[:, [0, -1]]
+        sums = np.stack([0 * self.sums, self.sums], axis=1)
+        return np.concatenate([self.course.states[:, [0, -1]], sums])
 
 
 class GaitWithInertia:
@@ -408,8 +448,12 @@ class GaitWithInertia:
         breaks: _Breaks = (),
         turn: float = 0.0,
         regime: Regime = LEVEL,
+        quantities: Iterable[Quantity] = (),
     ) -> None:
-        self.body, self.path = checked_mass(body), gait
+        self.body, self.path, self.quantities = checked_mass(body), gait, _forced(quantities)
+        if self.quantities and len(breaks):
+            name = self.quantities[0].name
+            raise ProblemError(f"torques are infinite where joint rates jump: leave {name} out.")
         self.friction, self.delta, self.froude = friction, delta, float(froude)
         self.breaks, self.turn, self.regime = tuple(sorted(map(float, breaks))), turn, regime
         self.theta = float(getattr(gait, "theta", None) or 0.0)  # of the tail link at first
@@ -445,24 +489,38 @@ class GaitWithInertia:
 
         return integrate_period(rates, start.ravel(), aim, self.breaks)
 
+    def sums(self, ran: Course, aim: float, ends: np.ndarray = _END, motion: int = 0) -> np.ndarray:
+        """Quantities that need forces up to ascending phases, ``(k, n)``, to an error."""
+
+        def seen(t: np.ndarray) -> Instants:
+            of, delta = (self.body, self.friction), self.delta
+            at = *of, self.path, t, ran.at(t)[7 * motion :][_MOMENTA]
+            moments = joint_torques(*at, delta=delta, froude=self.froude)
+            return Instants(*of, *self.path(t), delta, moments=moments)
+
+        return _sums(seen, self.quantities, ran.phases, aim, ends)
+
     def totals(self, states: np.ndarray) -> Numbers:
-        """Distance, work of the joints and rotation from the first of states ``(7, n)`` to the
-        last."""
+        """Distance, joints' work, rotation and quantities from the first of states to the last."""
         change = states[:, -1] - states[:, 0]
         way = self.regime.travel_along(complex(*change[_PLACE]))
         return {
             "distance": chord_per_way(self.turn) * way.real,
             "work": float(change[_WORK] + self.regime.grade * change[_PLACE][0]),
             "rotation": float(change[_THETA]) + self.turn,
+            **{each.name: float(change[7 + k]) for k, each in enumerate(self.quantities)},
         }
 
     def period_map(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States before and after a period ``(7, 2)``, and derivatives of the latter by the momenta
-        before it, ``(7, 3)``, by differences."""
+        """States before and after a period ``(7 + k, 2)``, and derivatives of the latter by the
+        momenta before it, ``(7 + k, 3)``, by differences."""
         begin = np.zeros((4, 7))
         begin[:, _MOMENTA] = start + np.vstack([np.zeros(3), _APART * np.eye(3)])
         begin[:, _THETA] = self.theta
-        end = self.run(begin, self._rough).states[:, -1].reshape(begin.shape)
+        ran = self.run(begin, self._rough)
+        sums = [self.sums(ran, self._rough, motion=k)[:, 0] for k in range(4)]
+        end = np.column_stack([ran.states[:, -1].reshape(begin.shape), sums])
+        begin = np.pad(begin, ((0, 0), (0, len(self.quantities))))
         return np.stack([begin[0], end[0]], axis=1), (end[1:] - end[0]).T / _APART
 
     def rough_period(self, near: np.ndarray) -> RoughPeriod:
@@ -495,7 +553,7 @@ class GaitWithInertia:
             step = _newton_step(gap, slopes)
             start, size = start + step, np.abs(step).max()
             if size < aim or (before <= size and np.abs(gap).max() < _LEFT_OPEN * aim):
-                return PeriodicRun(course, start, aim)
+                return PeriodicRun(course, start, aim, self.sums(course, aim)[:, 0])
             before = size
         raise self._not_alike()
 
@@ -523,8 +581,8 @@ class GaitWithInertia:
     def changes(
         self, ends: np.ndarray, slopes: np.ndarray, steps: np.ndarray, gap: np.ndarray
     ) -> Numbers:
-        """Changes of `totals` where the end errs by `steps` ``(7,)`` and momenta do not close by a
-        gap."""
+        """Changes of `totals` where the end errs by `steps` ``(7 + k,)`` and momenta do not close
+        by a gap."""
         off = np.column_stack([np.diag(steps), amplification(slopes) * (steps[_MOMENTA] + gap)])
         (start, end), totals = ends.T, self.totals(ends)
         changed = [self.totals(np.column_stack([start, end + each])) for each in off.T]
@@ -532,7 +590,7 @@ class GaitWithInertia:
 
 
 def amplification(slopes: np.ndarray) -> np.ndarray:
-    """Derivatives ``(7, 3)`` of the end of a period by what every period adds to the momenta."""
+    """Derivatives ``(7 + k, 3)`` of the end of a period by what each adds to the momenta."""
     return np.asarray(np.linalg.solve(np.eye(3) - slopes[_MOMENTA].T, slopes.T).T)
 
 
@@ -576,13 +634,12 @@ def inertial_motion(
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
     objective : Objective
-        Of distance, work, rotation, period [sqrt(length / gravity)] and what shapes and their rates
-        sum up to.
+        Of distance, work, rotation, period [sqrt(length / gravity)] and quantities.
     turn : float
         Net rotation that the gait is asked for [rad]: the distance is the chord of an arc that
         turns by as much.
     quantities : iterable of Quantity or str
-        Further quantities that shapes and their rates sum up to.
+        Further quantities, as ``["driven_work"]``.
     regime : Regime
         On a slope `problem.regime`, or `colloc.gaits.regime.Regime`: the gait says where it points,
         distance and work are as of `colloc.slope_motion`.
@@ -607,11 +664,11 @@ def inertial_motion(
     (0.136, True)
     """
     check_finite(positive=True, froude=froude, delta=delta)
-    moving = GaitWithInertia(
-        body, friction, gait, delta, froude=froude, breaks=breaks, turn=turn, regime=regime
-    )
+    asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
+    how: Any = {"froude": froude, "breaks": breaks, "turn": turn, "regime": regime}
+    moving = GaitWithInertia(body, friction, gait, delta, quantities=asked, **how)
     start, ends, slopes = moving.find_period(near)
-    totals = whole_totals([LENGTH, *objective.integrals, *quantities_of(quantities)], gait)
+    totals = whole_totals(asked, gait)
     period = {"period": float(froude) ** -0.5}
 
     def run(aim: float) -> tuple[PeriodicRun, Numbers]:
@@ -621,7 +678,7 @@ def inertial_motion(
         return ran, moving.totals(ran.ends) | period
 
     # runs that cannot be the last but one are left out
-    usual = moving.changes(ends, slopes, np.full(7, _USUAL * tolerance), np.zeros(3))
+    usual = moving.changes(ends, slopes, np.full(len(ends), _USUAL * tolerance), np.zeros(3))
     lost = objective.relative_error(moving.totals(ends) | period | totals[0], usual)
     first = tolerance / max(1.0, lost / tolerance)
     errors_of = partial(moving.errors, slopes=slopes)
@@ -653,7 +710,8 @@ def inertial_replay(
     """
     regime = regime.at(gait)
     how: Any = {"froude": regime.froude, "breaks": breaks, "turn": turn, "regime": regime}
-    moving = GaitWithInertia(body, friction, gait, delta, **how)
+    asked = [*objective.integrals, *quantities_of(quantities)]
+    moving = GaitWithInertia(body, friction, gait, delta, quantities=asked, **how)
     begin = None if near is None else moving.momenta(near.tail_velocity(np.zeros(1)))
     how |= {"tolerance": tolerance, "objective": objective, "quantities": quantities}
     ran = inertial_motion(body, friction, gait, delta, near=begin, **how)
@@ -663,8 +721,12 @@ def inertial_replay(
         with suppress(NotConvergedError):  # Newton's method need not lead to any from there
             from_rest = moving.rough_period(np.zeros(3)).momenta
     several = float(np.abs(from_rest - states[_MOMENTA, 0]).max() > _OTHER)
-    other = moving.run(from_rest, tolerance).states if several else states
-    here, there = moving.totals(states), moving.totals(other)
+    others: Numbers = {}
+    if several:
+        other = moving.run(from_rest, tolerance)
+        sums = moving.sums(other, tolerance)[:, 0]
+        there = moving.totals(PeriodicRun(other, from_rest, tolerance, sums).ends)
+        others = {name: abs(value - ran.values[name]) for name, value in there.items()}
     angles, rates = moving.path(phases)
     z = tail_velocity(chain, angles, rates, states[_MOMENTA])
     energy = regime.froude * kinetic_energy(chain, angles, rates, z)[0]
@@ -678,7 +740,7 @@ def inertial_replay(
     return Replay(
         values=ran.values,
         errors=ran.errors,
-        others={name: abs(there[name] - here[name]) for name in here},
+        others=others,
         lever=lever(chain, angles),
         actuator_work=ran.work + float(energy[-1] - energy[0]),
         residual=float(np.abs(change[_MOMENTA]).max()),

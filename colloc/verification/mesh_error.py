@@ -7,18 +7,21 @@ nodes; the integral of the *defect*, that polynomial less the true rate, is the 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from colloc.dynamics.chain import joint_torques
 from colloc.dynamics.collocated import CollocatedPose, stage_weights
 from colloc.dynamics.control_problem import Admissible, ControlProblem
-from colloc.dynamics.dynamics import OMEGA, PeriodTotals, QuasiStatic, Shapes, Trajectory
+from colloc.dynamics.dynamics import OMEGA, Inertial, PeriodTotals, QuasiStatic, Shapes, Trajectory
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import crossing_depth, far_pairs
+from colloc.mechanics.inertia import STATES
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
 from colloc.verification.adaptive_motion import LEAST, fine_motion, rates_at, totals_along
@@ -90,21 +93,22 @@ def gait_motion(
     error = tolerance / counts if np.isfinite(counts) else tolerance
     if hasattr(regime, "reference"):
         return regime.reference(control, gait, delta, mesh, error)
+    asked = control.aims.integrals
     if regime.froude:
         paced = regime.at(gait)
-        moving = GaitWithInertia(
-            body, law, gait, delta, froude=paced.froude, turn=kind.turn, regime=paced
-        )
+        how: Any = {"froude": paced.froude, "turn": kind.turn, "regime": paced}
+        moving = GaitWithInertia(body, law, gait, delta, quantities=asked, **how)
         begin, _, slopes = moving.rough_period(on_mesh.along.edges[:, 0])
         times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
         run = moving.periodic_run(begin, max(error / times, LEAST), slopes)
         alone = kind.alone  # type: ignore[attr-defined]
-        return ReferenceMotion(run.course.at, times * run.aim, alone=alone)
+        sums = partial(moving.sums, run.course, run.aim)
+        return ReferenceMotion(run.course.at, times * run.aim, sums, alone)
     if regime.slides:
-        asked = [each for each in control.aims.integrals if each.needs_forces]
         on = GaitOnSlope(body, law, gait, delta, regime.grade, gait.corner_phases)
         ran = on.integrate(gait.theta, error)
-        return ReferenceMotion(lambda t: ran.at(t)[:4], error, lambda t: on.totals(ran, asked, t))
+        sums = partial(on.totals, ran, error, asked)
+        return ReferenceMotion(lambda t: ran.at(t)[:4], error, sums)
     raise NotImplementedError(
         f"no differential equation is known for {type(regime).__name__}: give it a reference."
     )
@@ -241,6 +245,10 @@ def _collocate(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> 
     theta = kind.initial_heading(along.static)
     pose = CollocatedPose.on_mesh(mesh, along.now.z[OMEGA] - kind.turn, along.now.centre, theta)
     now = kind.instants(shapes, pose.theta_on(mesh), along.now.z)
+    if isinstance(kind, Inertial):
+        how: Any = {"delta": delta, "froude": kind.froude_at(shapes, along.static)}
+        at = kind.chain, kind.law, gait, mesh.times, along.states[: len(STATES)]
+        now = replace(now, moments=joint_torques(*at, **how))
     work = (weights * along.now.power[mesh.points]).sum(axis=1)
     sums = {
         each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1)

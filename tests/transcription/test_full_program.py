@@ -55,6 +55,8 @@ turning: rotation=None, objective="turning", gait=Harmonic(1)
 actuators: torque_limit=0.05, power_limit=0.4
 quantities: objective=Objective("distance / (work + heat)", quantities=(HEAT,))
 driven: objective="driven efficiency", grade=0.1
+driven with inertia: objective="driven efficiency", froude=0.3, grade=0.1
+driven at a free pace: objective="distance / (driven_work + 0.1 * period)", froude=Free(0.01, 1.0)
 at least: at_least={"distance": 0.1, "efficiency": 0.2}
 joint speeds: speed_limit=9.0
 modes: body=ModalBody(3), gait=Harmonic(1, "antipodal"), guess=None
