@@ -10,6 +10,7 @@ import pytest
 import colloc
 from colloc import Chain, CollocError, Foot, Friction, Harmonic, PowerLaw, Problem, ProblemError
 from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.gaits.prescribed import Prescribed
 from colloc.smooth.balance import Motion, solve_smooth
 from colloc.smooth.prescribed_body import Wave
 from colloc.system.errors import OrderWarning
@@ -63,7 +64,9 @@ def path(angles, rates):
 
 
 NAMES = {name: getattr(colloc, name) for name in colloc.__all__} | globals()
-NAMES |= {each.__name__: each for each in (checked_chain, dry_friction, Wave, solve_smooth)}
+NAMES |= {
+    each.__name__: each for each in (checked_chain, dry_friction, Prescribed, Wave, solve_smooth)
+}
 
 
 def cases(text, separator, most=-1):
@@ -377,6 +380,62 @@ OwnLaw("-vs +", "-vn") -> is no formula
 OwnLaw("-vs.real", "-vn") -> is no formula that can be differentiated
 OwnLaw("__import__('os')", "-vn") -> is no formula|speaks of
 OwnLaw("-vs**vs", "-vn") -> exponent
+evaluate(PROBLEM, np.zeros((3, 20))) -> angles of 3 joints, and the body has 2
+evaluate(PROBLEM, np.full((2, 20), np.nan)) -> no finite angle of joint 1 at sample 1
+evaluate(PROBLEM, GAIT.angles(np.arange(20) / 60)) -> does not close
+evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=0) -> period must be positive
+evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=0.06) -> in the file's unit of time
+evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), harmonics=40) -> 60 samples determine 1 to 28 harmonics
+evaluate(PROBLEM, 0.01 * GAIT.angles(np.arange(60) / 60)) -> hardly moves
+evaluate(PROBLEM, "nowhere.csv") -> cannot read nowhere.csv
+evaluate(PROBLEM, {"a": 1}) -> gait must be a Fourier, numbers, text, a path or a function
+evaluate(Problem("up", gait=Harmonic(1), grade=0.1), GAIT) -> colloc\.slope_motion
+evaluate(Problem("x", gait=Harmonic(1), froude=Free(0.1, 1.0), objective="efficiency"), GAIT) -> does not say its pace
+steer(PROBLEM, []) -> half a turn|a sequence of numbers
+steer(PROBLEM, [4.0]) -> half a turn|a sequence of numbers
+steer(PROBLEM, [float("nan")]) -> half a turn|a sequence of numbers
+steer(Problem("x", gait=Harmonic(1), rotation=0.1), [0.2]) -> straight
+pareto_front(PROBLEM, "speed", "distance/length") -> two objectives
+Study("s", (), lambda: PROBLEM) -> at least one Axis
+Study("s", [Axis("x", (1,)), Axis("x", (2,))], lambda x: PROBLEM) -> same name
+Study("a b", [Axis("x", (1,))], lambda x: PROBLEM) -> name must be
+Study("s", [Axis("x", (1,))], lambda x: PROBLEM, chunk=0) -> chunk must be
+Study("s", [Axis("x", (1,))], lambda x: PROBLEM, time_limit="long") -> must be positive
+Study("s", [Axis("x", (1,))], 3) -> must be a function
+Study("s", [Axis(name, range(1001)) for name in "xy"], lambda x, y: PROBLEM) -> 1000000 cells
+Axis("x", (1.0, None)) -> values of an axis must be numbers
+Axis("x", ([1.0, 2.0],)) -> values of an axis must be numbers
+Axis("x", ()) -> axis x
+Axis("x", (1.0, 1.0)) -> axis x
+Axis("x", (1.0, "a")) -> axis x
+Axis("x", (float("nan"),)) -> axis x
+Harmonic(2, "antipodal") -> odd harmonics only.*ask for 1 or 3
+Harmonic(6, "antipodal") -> odd harmonics only.*ask for 5 or 7
+Harmonic(0) -> harmonics
+Harmonic(1.5) -> harmonics
+Harmonic(symmetry="mirror") -> symmetry
+Fourier([0.0], [[1.0]], [[1.0, 2.0]]) -> shape
+Harmonic(2).member(np.full(9, 1e308), 2) -> must be a finite
+BSpline(4) -> from degree
+BSpline(1, 1) -> knots
+BSpline(9, symmetry="antipodal") -> even number of knots
+BSpline(8, degree=0) -> degree must be 1, 2, 3, 4 or 5
+Basis([np.arange(96.0)]) -> too rough
+Basis([np.ones(48)]) -> nothing would move
+Basis([np.sin(np.arange(n) * 2 * np.pi / n) for n in (96, 48)]) -> must be alike
+Basis([np.ones(5)]) -> at least 24
+Basis("nowhere.csv") -> cannot read nowhere.csv
+Basis(3) -> a sequence of columns
+Polygon(1) -> corners
+Polygon(5, "antipodal") -> even
+Polygon(4, "bilateral", "edge") -> axis
+Corners(np.array([[1.0, 1.0], [0.0, 0.0]])) -> equal neighbours
+Corners("triangle") -> numbers
+CrawlerBody(0.05).concertina(1.3, way=(0.9,)) -> must be
+CrawlerBody(0.05).concertina(1.3, way=(0.9, "text")) -> must be
+CrawlerBody(0.05).concertina(1.3, way=0.9) -> must be
+CrawlerBody(0.05).concertina(1.3, sides=3) -> must be
+CrawlerBody(0.05).concertina("wide") -> must be
 """
 
 
@@ -459,6 +518,39 @@ body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=MIRRORED -> read the sam
 guess=ellipse(1.0, 1e-6, 0.7e-6), gait=MIRRORED -> hardly moves
 guess=ellipse(0.0, 1.0, 2 * np.pi / 3 + 1e-5), gait=MIRRORED -> cross
 guess=ellipse(np.pi - 1, 1.0 + 1e-5, 0.1), gait=MIRRORED -> beyond the limit
+gait=Polygon(8), froude=0.2, torque_limit=0.05 -> infinite where joint rates jump
+friction=Friction(mu_t=-1, mu_f=1, mu_b=1) -> mu_t
+guess=ellipse(0.0, 4.0, 0.8), gait=MIRRORED -> inadmissible: joint
+gait=MIRRORED, intervals=1 -> mesh is too small
+guess=Fourier([0], [[1]], [[1]]), gait=MIRRORED -> 1 joints
+guess=ellipse(0.0, 0.0, 0.0), gait=MIRRORED -> hardly moves
+gait=Basis([BUMP, BUMP]) -> depend on one another
+gait=Basis([np.exp(np.roll(BUMP, 5))], "bilateral") -> no symmetry 'bilateral'
+body=Chain((0.25,) * 4), gait=Basis([np.stack([BUMP, np.roll(BUMP, 5)])]) -> angles of 2 joints, and the body has 3
+gait=Polygon(4), scheme="trapezoid" -> gauss-N or radau-N
+gait=Polygon(6), intervals=8 -> mesh is too small
+gait=Polygon(4), body=Chain((0.5, 0.5)), guess=Fourier([0.0], [[1.0]], [[0.0]]) -> three links
+gait=Polygon(4), guess=Corners(np.array([[0.1, -0.1], [0.0, 0.0]])) -> hardly moves
+gait=Polygon(4, "bilateral"), body=Chain((0.2, 0.3, 0.5)) -> both ends
+gait=Serpenoid(), body=Chain((0.5, 0.5)) -> at least three links
+gait=Harmonic(1), joint_limit=0.05 -> with joint_limit the usual first gait
+objective="turning" -> rotation
+rotation=0.2, gait=MIRRORED -> bilateral gait turns
+rotation=np.inf -> rotation must be
+at_least={"distance": "far"} -> finite number
+at_least={"size": 1.0} -> speaks of size
+body=ModalBody(2), guess=Fourier([0, 0], [[2], [0]], [[0], [0.1]]), gait=Harmonic(1) -> tangent at .* reaches
+body=ModalBody(4), guess=Fourier([0] * 3, [[1]] * 3, [[0]] * 3), gait=Harmonic(1) -> 3 modes but the body has 4
+body=ModalBody(4, "fourier"), gait=MIRRORED -> none or antipodal
+body=ModalBody(), gait=Harmonic(1), joint_limit=2.0 -> \(0, pi/2\]
+body=ModalBody(), gait=Harmonic(1), formulation="full" -> must be one of implicit velocity
+body=ModalBody(), gait=Harmonic(1, "antipodal"), intervals=1 -> mesh is too small
+body=ModalBody -> body must be a Chain or ModalBody
+body=Wave(), gait=Harmonic() -> leave gait out
+body=Wave(), gait=Prescribed((0.0, 0.25, 1.0)) -> may have the symmetry antipodal
+gait=Prescribed() -> not prescribed
+body=ModalBody(), gait=Prescribed() -> not prescribed
+body=Wave(amplitude=1.8) -> the tangent reaches 1.8 rad
 """
 
 
@@ -490,7 +582,10 @@ def test_what_lies_beside_it_is_taken(fields):
 @pytest.mark.parametrize(
     ("name", "taken"),
     [(f"tiny.{end}", False) for end in ("interrupted", "FAILED", "starts", "run", "shrunk")]
-    + [(name, False) for name in ("x.front", "x.start-7", "x.former-2", ".", "..", "--help", "-x")]
+    + [
+        (name, False)
+        for name in ("x" * 300, "x.front", "x.start-7", "x.former-2", ".", "..", "--help", "-x")
+    ]
     + [(name, True) for name in ("tiny.failed.2", "partial", "x.start", "_", "3.5", "a--help")],
 )
 def test_names_of_files_that_colloc_makes_beside_results_are_refused(name, taken):

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,7 @@ from colloc.commands.solve import summary_lines
 from colloc.gaits import gait_fields
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.kept import save_result
+from colloc.search.checkpoint import Run
 from colloc.system.row_file import CACHE, put_rows
 
 QUICK = """
@@ -72,10 +74,8 @@ def python(*words, stdout=subprocess.PIPE, **options):
 @pytest.mark.parametrize(
     ("module", "words"),
     [
-        ("argparse", "colloc.solve x"),
-        ("dataclasses", "colloc verify --json x"),
-        ("numpy", "colloc solve quick.py"),
-        ("casadi", "colloc solve quick.py"),
+        *(("argparse", "colloc.solve x"), ("dataclasses", "colloc verify --json x")),
+        *((library, "colloc solve quick.py") for library in ("numpy", "casadi")),
     ],
 )
 def test_ctrl_c_while_libraries_are_imported_ends_without_a_traceback(
@@ -125,13 +125,6 @@ def test_letters_that_an_encoding_lacks_are_printed_as_words(encoding, three_lin
     assert exit_code(lambda: print("\n".join(lines)) or 0) == 0
     shown = "cos 2πt" if encoding == "utf-8" else "cos 2 pi t"
     assert shown in printed.getvalue().decode(encoding)
-
-
-def test_a_start_of_another_body_is_named(three_link, tmp_path, capsys):
-    start = save(three_link, tmp_path / "three.h5")
-    words = ["solve", "problems/four_link.py", "--start", str(start), "--output", f"{tmp_path}/"]
-    assert colloc(words) == 2
-    assert f"the gait of {start} cannot be the guess: guess has 2 joints" in capsys.readouterr().err
 
 
 def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning_and_not_the_bound(
@@ -335,9 +328,8 @@ def shell(line, folder):
 
 
 @needs_bash
-@pytest.mark.parametrize("closed", [">&- 2>&-", "<&- >&- 2>&-"])
-def test_closed_streams_change_nothing_but_what_is_printed(closed, quick, tmp_path):
-    line = f"colloc solve {quick} --no-figure --output {tmp_path}/ {closed}"
+def test_closed_streams_change_nothing_but_what_is_printed(quick, tmp_path):
+    line = f"colloc solve {quick} --no-figure --output {tmp_path}/ <&- >&- 2>&-"
     code, *said = shell(line, tmp_path)
     assert code in OK
     assert said == ["", ""]
@@ -358,6 +350,7 @@ def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_pat
     library, kernel = Path(ending.__file__).parents[1], shutil.ignore_patterns("_kernel.*")
     copied = shutil.copytree(library, tmp_path / "colloc", ignore=kernel)
     (copied / "mechanics" / "native" / "parts.h").write_text("/* another */")
+    Path(quick).write_text(QUICK.replace("=12", "=6, mesh_tolerance=0.0"), encoding="utf-8")
     environment = {**os.environ, "PATH": "", "PYTHONPATH": str(tmp_path)}
     words = f"-m colloc multistart {quick} --starts 2 --workers 2 --quiet --output {tmp_path}/"
     code, _, complaint = python(*words.split(), env=environment, cwd=tmp_path)
@@ -365,3 +358,39 @@ def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_pat
     slowly = "colloc: the balance is solved by NumPy, 10 to 60 times more slowly: the compiled"
     assert complaint.startswith(slowly)
     assert complaint.count("\n") == 1
+
+
+ONE_AFTER_ANOTHER = """
+from colloc import *
+FLOOR = Friction(mu_t=4, mu_f=1, mu_b=1)
+PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=FLOOR, delta=1e-2, mesh_tolerance=1e-3)
+"""
+SEVERAL = {"steer": ["--turn", "10"], "pareto": ["--points", "2"]}
+
+
+@pytest.mark.parametrize("name", SEVERAL)
+def test_an_interrupted_command_goes_on_from_its_last_problem(name, tmp_path, monkeypatch, capsys):
+    (tmp_path / "p.py").write_text(ONE_AFTER_ANOTHER, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    command = [name, "p.py", *SEVERAL[name], "--starts", "1", "--no-figure", "--quiet"]
+    kept, computed, interruptions = Run.result, [], []
+
+    def interrupted_at_the_second(run, stage, arguments):
+        @wraps(stage)
+        def counted(*arguments):
+            computed.append(run.problem.hash)
+            if computed[0] != computed[-1] and not interruptions:
+                interruptions.append("once")
+                raise KeyboardInterrupt
+            return stage(*arguments)
+
+        return kept(run, counted, arguments)
+
+    monkeypatch.setattr(Run, "result", interrupted_at_the_second)
+    assert colloc(command) == 130
+    assert "the same command goes on" in capsys.readouterr().err
+    second = computed[-1]
+    computed.clear()
+    assert colloc(command) == 0
+    assert set(computed) == {second}
+    assert not list(tmp_path.glob("**/*.sqlite"))

@@ -100,10 +100,8 @@ def test_the_way_into_a_gait_keeps_the_speed_limit_of_its_problem(unsolved, tmp_
 
 def test_torques_on_the_way_into_a_gait_come_to_be_those_of_the_gait(unsolved, tmp_path):
     """Also where they depend on speeds: in a medium that drags."""
-    drag = {"friction": Viscous(normal=2, tangential=1), "objective": "towing"}
-    solution = unsolved(
-        Problem("drag", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, **drag)
-    )
+    drag = {"friction": Viscous(normal=2, tangential=1), "objective": "towing", "delta": 1e-2}
+    solution = unsolved(Problem("drag", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), **drag))
     solution.export(tmp_path / "x.csv", period=4.0, rate=50.0, length=1.2, mass=3.0)
     columns = pandas.read_csv(tmp_path / "x.csv", comment="#")
     torques = columns[["joint_1_N_m", "joint_2_N_m"]].to_numpy().T
@@ -142,13 +140,8 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
     lines = (tmp_path / "x.csv").read_text().splitlines()
     facts = dict(line[2:].split(": ", 1) for line in lines if line.startswith("#"))
     rows = list(csv.reader(line for line in lines if not line.startswith("#")))
-    assert rows[0] == [
-        "time_s",
-        "joint_1_rad",
-        "joint_2_rad",
-        "joint_1_rad_per_s",
-        "joint_2_rad_per_s",
-    ]
+    names = [f"joint_{k}_rad{per}" for per in ("", "_per_s") for k in (1, 2)]
+    assert rows[0] == ["time_s", *names]
     values = np.array(rows[1:], dtype=float)
     assert values[0, 0] == pytest.approx(-float(facts["ramp_s"]))
     values = values[values[:, 0] >= 0]
@@ -159,13 +152,10 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
     problem = three_link.problem
     replayed = replay(problem.body, problem.friction, path_through(values[:n, 1:3].T), 1e-4)
     assert replayed.efficiency == pytest.approx(json.loads(facts["efficiency"]), rel=2e-4)
-    assert replayed.distance == pytest.approx(
-        json.loads(facts["distance_per_period_body_lengths"]), rel=2e-4
-    )
-
-    assert (
-        main([str(file), "--period", "4", "--no-ramp", "--output", str(tmp_path / "y.json")]) == 0
-    )
+    way = json.loads(facts["distance_per_period_body_lengths"])
+    assert replayed.distance == pytest.approx(way, rel=2e-4)
+    words = f"--period 4 --no-ramp --output {tmp_path}/y.json"
+    assert main([str(file), *words.split()]) == 0
     data = json.loads((tmp_path / "y.json").read_text())
     assert np.shape(data["angles_rad"]) == (2, 200)
     assert data["status"] == "solved"
@@ -182,24 +172,20 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
 def test_where_the_pace_matters_it_is_kept_so_that_the_numbers_of_the_result_hold(
     changes, unsolved, tmp_path
 ):
-    solution = unsolved(
-        Problem("paced", ellipse(0.0, 1.2, 0.8), gait=Harmonic(1), delta=1e-2, **changes)
-    )
+    stated = {"gait": Harmonic(1), "delta": 1e-2} | changes
+    solution = unsolved(Problem("paced", ellipse(0.0, 1.2, 0.8), **stated))
     problem, limits = solution.problem, np.array([2.0, 1.5])
     stated = solution.export(tmp_path / "x.json", max_speed=limits, rate=400, ramp=False)
     written = json.loads((tmp_path / "x.json").read_text())
-    made = replay(
-        problem.body, problem.friction, path_through(np.array(written["angles_rad"])), 1e-2
-    )
+    path = path_through(np.array(written["angles_rad"]))
+    made = replay(problem.body, problem.friction, path, 1e-2)
     assert made.work == pytest.approx(stated["work_per_period_weight_times_length"], rel=2e-4)
     assert made.distance == pytest.approx(stated["distance_per_period_body_lengths"], rel=2e-4)
     speeds = np.abs(written["speeds_rad_per_s"]).max(axis=1) / limits
     assert 0.99 < speeds.max() <= 1 + 1e-9  # the period is the shortest
     assert "the gait's own" in stated["pace"]
-    with pytest.raises(
-        ProblemError,
-        match=r"too short for the joint speed limits at the gait's own pace.*use at least",
-    ):
+    said = r"too short for the joint speed limits at the gait's own pace.*use at least"
+    with pytest.raises(ProblemError, match=said):
         solution.export(tmp_path / "x.json", max_speed=limits, period=0.99 * stated["period_s"])
 
 
@@ -210,10 +196,8 @@ def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
     assert repr(solution.gait) == "<Fourier of 2 modes>"
     solution.export(tmp_path / "soft.csv", period=4)
     columns = pandas.read_csv(tmp_path / "soft.csv", comment="#").columns
-    assert [*columns] == [
-        "time_s",
-        *(f"mode_{k}_rad{per}" for per in ("", "_per_s") for k in (1, 2)),
-    ]
+    names = [f"mode_{k}_rad{per}" for per in ("", "_per_s") for k in (1, 2)]
+    assert [*columns] == ["time_s", *names]
     data = solution.to_xarray()
     assert data.modes.dims == data.mode_rates.dims == ("mode", "t")
     with h5py.File(save(solution, tmp_path / "soft.h5")) as file:

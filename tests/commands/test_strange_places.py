@@ -8,7 +8,6 @@ import sys
 import casadi
 import pytest
 
-from colloc.commands.main import main as colloc
 from colloc.results.store import load, save
 
 QUICK = """# Länge der Schlange: µ_t = 1
@@ -95,10 +94,3 @@ def test_a_name_as_long_as_systems_allow_is_kept(three_link, tmp_path):
     # 203 bytes; with those of the temporary file below 255
     path = save(three_link, tmp_path / ("ä" * 100 + ".h5"))
     assert load(path).certificate == three_link.certificate
-
-
-def test_a_folder_that_nobody_can_write_in_is_refused_in_one_sentence(place, capsys):
-    assert colloc(["solve", str(place / "quick.py"), "--output", "/proc/"]) == 2
-    printed = capsys.readouterr()
-    assert printed.err.count("\n") == 1
-    assert "cannot" in printed.err

@@ -18,11 +18,8 @@ def test_what_fails_is_told_in_full_and_what_holds_is_counted(three_link):
         Check("closure", 2e-3, 1e-9, "joint angles after one period"),
         Check("second order", 0.3, 1e-2, "a saddle"),
     ]
-    good = [
-        check
-        for check in three_link.certificate.checks
-        if check.name not in ("closure", "second order")
-    ]
+    failing = {check.name for check in bad}
+    good = [check for check in three_link.certificate.checks if check.name not in failing]
     failed = replace(three_link, certificate=replace(three_link.certificate, checks=(*good, *bad)))
     lines = summary_lines(failed, None)
     assert f"  {bad[0].line()}" in lines
@@ -43,9 +40,8 @@ def told_of_limits(gait=LOOP, **limits):
 
 
 def test_the_share_of_every_limit_that_a_gait_uses_is_told_with_its_unit():
-    found, lines = told_of_limits(
-        joint_limit=2.0, speed_limit=10.0, torque_limit=0.05, power_limit=(0.2, 0.4)
-    )
+    limits = {"torque_limit": 0.05, "power_limit": (0.2, 0.4)}
+    found, lines = told_of_limits(joint_limit=2.0, speed_limit=10.0, **limits)
     shares = summary_dict(found, None, None, None)["limits"]
     assert list(shares) == ["joint angles", "joint speed", "torque", "power"]
     t = np.linspace(0, 1, 4001)
@@ -54,9 +50,8 @@ def test_the_share_of_every_limit_that_a_gait_uses_is_told_with_its_unit():
     assert shares["joint speed"] == pytest.approx(np.abs(rates).max() / 10.0, rel=1e-5)
     torques = joint_torques(found, t)
     assert shares["torque"] == pytest.approx(np.abs(torques).max() / 0.05, rel=1e-3)
-    assert shares["power"] == pytest.approx(
-        ((torques * rates).max(axis=1) / [0.2, 0.4]).max(), rel=1e-3
-    )
+    powers = (torques * rates).max(axis=1) / [0.2, 0.4]
+    assert shares["power"] == pytest.approx(powers.max(), rel=1e-3)
     of_speed, of_torque = f"{100 * shares['joint speed']:.0f}", f"{100 * shares['torque']:.0f}"
     assert lines == [
         f"joint angles {100 * shares['joint angles']:.0f} %, joint speed {of_speed} % of 10 rad "
@@ -82,26 +77,21 @@ def test_limits_that_no_gait_could_reach_are_named_with_what_it_could_need():
 def test_a_limit_of_all_joints_matters_if_it_does_to_one_and_one_of_each_is_named_by_its_joint():
     """The outer joints of four links with short ends need 0.02 at most, the inner one more than
     that."""
-    body, wave = (
-        Chain((0.2, 0.3, 0.3, 0.2)),
-        Fourier(np.zeros(3), [[0.2], [0.9], [0.2]], [[0.5], [0.0], [-0.5]]),
-    )
+    body = Chain((0.2, 0.3, 0.3, 0.2))
+    wave = Fourier(np.zeros(3), [[0.2], [0.9], [0.2]], [[0.5], [0.0], [-0.5]])
     found, lines = told_of_limits(wave, body=body, torque_limit=0.1)
     assert summary_dict(found, None, None, None)["limits"]["torque"] * 0.1 > 0.02
     assert not lines[1:]
     _, lines = told_of_limits(wave, body=body, torque_limit=(0.1, 0.1, 0.01))
-    assert len(lines) == 2
-    assert lines[1].startswith(
-        "torque_limit 0.1 of joint 1 cannot matter: no gait needs more than 0.02 weight"
-    )
+    said = "torque_limit 0.1 of joint 1 cannot matter: no gait needs more than 0.02 weight"
+    assert [line[: len(said)] for line in lines[1:]] == [said]
 
 
 def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_path):
     """The collocated ones differ from them by more than their errors, so here they are made to
     differ by much."""
-    solution = replace(
-        three_link, answer=replace(three_link.answer, value=9.0, distance=9.0, work=9.0)
-    )
+    answer = replace(three_link.answer, value=9.0, distance=9.0, work=9.0)
+    solution = replace(three_link, answer=answer)
     facts = summary_dict(replace(solution, shrunk=solution), tmp_path, None, None)
     for name in ("value", "efficiency", "distance", "work"):
         assert facts[name] == facts["certificate"][name] == getattr(three_link.certificate, name)
@@ -117,21 +107,12 @@ def test_a_limit_that_a_gait_reaches_is_never_said_not_to_matter(harmonics):
         gait = gait.scaled(1.2 / np.abs(gait.angles(np.arange(500) / 500)).max())
         most = np.abs(gait.rates(np.arange(500) / 500)).max()
         stated = Problem("reached", gait=Harmonic(harmonics), delta=1e-2)
-        shares = replay(
-            Chain(),
-            Friction(),
-            gait,
-            1e-2,
-            tolerance=1e-3,
-            limits=(PathLimit("torque", "moment", 1), PathLimit("power", "power", 1)),
-        ).shares
-        limits = {
-            "joint_limit": 1.2,
-            "speed_limit": 0.99 * most,
-            "torque_limit": 0.99 * shares[:2].max(),
-            "power_limit": 0.99 * shares[2:].max(),
-        }
-        said = limit_use.lines(evaluate(stated.with_(guess=None, **limits), gait))
+        ones = PathLimit("torque", "moment", 1), PathLimit("power", "power", 1)
+        shares = replay(Chain(), Friction(), gait, 1e-2, tolerance=1e-3, limits=ones).shares
+        torque, power = (0.99 * part.max() for part in np.split(shares, 2))
+        limits = {"torque_limit": torque, "power_limit": power, "speed_limit": 0.99 * most}
+        limits |= {"joint_limit": 1.2, "guess": None}
+        said = limit_use.lines(evaluate(stated.with_(**limits), gait))
         assert not any("cannot matter" in line for line in said)
 
 

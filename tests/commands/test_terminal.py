@@ -81,16 +81,13 @@ def test_no_command_is_left_out():
     assert COMMANDS.keys() == SUBCOMMANDS.keys()
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        *(
-            pytest.param(f"{name} {words}", id=name, marks=[pytest.mark.slow] * (name in LONG))
-            for name, words in COMMANDS.items()
-        ),
-        *ALSO,
-    ],
+CASES = (
+    pytest.param(f"{name} {words}", id=name, marks=[pytest.mark.slow] * (name in LONG))
+    for name, words in COMMANDS.items()
 )
+
+
+@pytest.mark.parametrize("words", [*CASES, *ALSO])
 def test_every_command_ends_well_in_a_terminal(words, quick, tmp_path):
     place(quick, tmp_path, *(path.name for path in quick.iterdir() if path.is_file()))
     shown(["colloc", *words.split()], tmp_path)

@@ -1,10 +1,13 @@
-"""Fourier series and their classes."""
+"""Fourier series, their classes, and serpenoid gaits: a few numbers for any number of links."""
 
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse, harmonics_within, shift_phase
-from colloc.system.errors import ProblemError
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, Serpenoid
+from colloc.gaits.harmonic import ellipse, harmonics_within, shift_phase
+from colloc.results.store import load, save
+from colloc.search.iterate import space_near
+from colloc.search.solve import solve
 
 T = np.linspace(0, 1, 37)
 
@@ -55,18 +58,32 @@ def test_the_paper_s_ellipse():
     np.testing.assert_allclose(angles[1], -expected + 1.4 * np.sin(2 * np.pi * T), atol=1e-12)
 
 
+FIVE = Chain((0.2,) * 5)
+SNAKE = Friction(mu_t=10, mu_f=1, mu_b=1)
+
+
 @pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: Harmonic(2, "antipodal"), "odd harmonics only.*ask for 1 or 3"),
-        (lambda: Harmonic(6, "antipodal"), "odd harmonics only.*ask for 5 or 7"),
-        (lambda: Harmonic(0), "harmonics"),
-        (lambda: Harmonic(1.5), "harmonics"),
-        (lambda: Harmonic(symmetry="mirror"), "symmetry"),
-        (lambda: Fourier([0.0], [[1.0]], [[1.0, 2.0]]), "shape"),
-        (lambda: Harmonic(2).member(np.full(9, 1e308), 2), "must be a finite"),
-    ],
+    "gait_class", [Serpenoid(2), Serpenoid(2, "bilateral"), Serpenoid(3, "antipodal")], ids=str
 )
-def test_unusable_classes_and_coefficients_are_refused_in_words(make, words):
-    with pytest.raises(ProblemError, match=words):
-        make()
+def test_joints_follow_one_another_by_a_lag_and_a_member_has_its_parameters(gait_class):
+    problem, t = Problem("s", body=FIVE, friction=SNAKE, gait=gait_class), np.linspace(0, 1, 7)
+    space, v = space_near(problem, Problem("g", body=FIVE).guess)
+    v = v + 0.05 * np.random.default_rng(1).standard_normal(v.size)
+    gait = space.member(v)
+    angles, earlier = gait.angles(t), gait.angles(t - gait.lag / (2 * np.pi))
+    np.testing.assert_allclose(angles[1:], earlier[:-1], atol=1e-13)
+    np.testing.assert_allclose(gait_class.parameters(gait), v, atol=1e-14)
+    told = Fourier(gait.mean, gait.cos, gait.sin)  # which does not know its lag
+    np.testing.assert_allclose(gait_class.parameters(told), v, atol=1e-6)
+
+
+def test_a_solved_one_is_certified_kept_and_no_better_than_all_harmonics(tmp_path):
+    problem = Problem("snake", body=FIVE, friction=SNAKE, gait=Serpenoid(symmetry="antipodal"))
+    found = solve(problem, starts=1)
+    assert found.success
+    whole = solve(problem.with_(gait=Harmonic(1, "antipodal"), guess=found.gait), starts=1)
+    assert found.efficiency < whole.efficiency
+    read = load(save(found, tmp_path / "snake.h5"))
+    assert read.problem.gait == problem.gait
+    assert read.gait.lag == found.gait.lag
+    assert "waves along the body" in str(read.gait)

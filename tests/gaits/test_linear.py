@@ -5,15 +5,13 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import Basis, BSpline, Chain, Friction, Harmonic, ModalBody, Problem, ProblemError
+from colloc import Basis, BSpline, Chain, Harmonic, ModalBody, Problem, ProblemError
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.gaits.gait_fields import CLASSES as KINDS
 from colloc.gaits.gait_fields import fields, gait_from, part_from
 from colloc.gaits.linear import enclosed_area
 from colloc.gaits.starts import initial_member
 from colloc.gaits.symmetry import SYMMETRIES
-from colloc.reduced.program import ReducedProgram
-from colloc.search.iterate import space_near
 
 T = np.arange(200) / 200
 PHASES = np.arange(96) / 96
@@ -60,10 +58,8 @@ def test_members_have_the_symmetry_of_their_class_and_are_found_again(symmetry, 
     gait_class = Basis(columns, symmetry) if columns else BSpline(8, symmetry=symmetry)
     for n_joint in (2, 3):
         gait = member(gait_class, n_joint)
-        if symmetry == "bilateral":
-            np.testing.assert_allclose(-gait.angles(-T)[::-1], gait.angles(T), atol=1e-8)
-        elif symmetry == "antipodal":
-            np.testing.assert_allclose(-gait.angles(T + 0.5), gait.angles(T), atol=1e-8)
+        images = {"bilateral": -gait.angles(-T)[::-1], "antipodal": -gait.angles(T + 0.5)}
+        np.testing.assert_allclose(images.get(symmetry, gait.angles(T)), gait.angles(T), atol=1e-8)
         again = gait_class.member(gait_class.parameters(gait), n_joint)
         np.testing.assert_allclose(again.table, gait.table, rtol=0, atol=1e-10)
         # as anybody's gait: by its angles alone
@@ -133,20 +129,6 @@ def test_statements_read_back_as_what_they_were():
         read = gait_from(fields(gait))
         assert read.basis == gait.basis
         np.testing.assert_array_equal(read.table, gait.table)
-
-
-@pytest.mark.parametrize("gait_class", CLASSES)
-def test_reduced_gradients_are_those_of_differences(gait_class):
-    friction = Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0 if gait_class.symmetry == "none" else 1.5)
-    problem = Problem("differences", friction=friction, gait=gait_class)
-    space, v = space_near(problem, problem.guess)
-    program, h = ReducedProgram(space, 1e-2), 1e-6
-    program.place_rows(v)
-    along = np.random.default_rng(3).normal(size=v.size)
-    numeric = (program.objective(v + h * along) - program.objective(v - h * along)) / (2 * h)
-    assert program.gradient(v) @ along == pytest.approx(numeric, rel=1e-5, abs=1e-8)
-    rows = (program.rows(v + h * along) - program.rows(v - h * along)) / (2 * h)
-    np.testing.assert_allclose(program.row_slopes(v) @ along, rows, rtol=1e-5, atol=1e-6)
 
 
 def test_columns_that_are_one_harmonic_have_its_optimum():
@@ -227,22 +209,3 @@ def test_a_file_of_columns_is_read_with_or_without_its_last_line_and_by_even_ste
     for times in (-t, 0 * t, np.where(t == 3, 3.01, t), 0.01 * np.where(t == 3, 3.01, t)):
         with pytest.raises(ProblemError, match="must rise by even steps"):
             read(times, columns)
-
-
-@pytest.mark.parametrize(("made", "words"), [
-    (lambda: BSpline(4), "from degree"),
-    (lambda: BSpline(9, symmetry="antipodal"), "even number of knots"),
-    (lambda: BSpline(8, degree=0), "degree must be 1, 2, 3, 4 or 5"),
-    (lambda: Basis([PHASES]), "too rough"),
-    (lambda: Basis([np.ones(48)]), "nothing would move"),
-    (lambda: Basis([bump(PHASES), bump(PHASES[:48])]), "must be alike"),
-    (lambda: Basis([bump(PHASES[:5])]), "at least 24"),
-    (lambda: Basis("nowhere.csv"), "cannot read nowhere.csv"),
-    (lambda: Basis(3), "a sequence of columns"),
-    (lambda: Problem("twice", gait=Basis([bump, bump])), "depend on one another"),
-    (lambda: Problem("one", gait=Basis([lambda t: bump(t - 0.1)], "bilateral")), "no symmetry 'bilateral'"),
-    (lambda: Problem("long", body=Chain((0.25,) * 4), gait=Basis(ELLIPSES)), "angles of 2 joints, and the body has 3"),
-])  # fmt: skip
-def test_what_cannot_be_is_refused_in_a_sentence(made, words):
-    with pytest.raises(ProblemError, match=words):
-        made()

@@ -4,23 +4,12 @@ refused."""
 import numpy as np
 import pytest
 
-from colloc import (
-    BSpline,
-    Chain,
-    Corners,
-    Fourier,
-    Friction,
-    Harmonic,
-    Polygon,
-    Problem,
-    ellipse,
-)
+from colloc import BSpline, Chain, Corners, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.starts import prolong
 from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
-from colloc.system.errors import ProblemError
 from colloc.verification.replay import replay
 
 TRIANGLE = Corners(np.array([[2.0, 2.9, 2.0], [-2.0, -2.0, -2.9]]))
@@ -141,27 +130,6 @@ def test_delta_keeps_its_meaning_from_class_to_class():
 
 def problem(gait, **changes):
     return Problem("p", **({"guess": ellipse(0, 1.5, 1.0), "gait": gait} | changes))
-
-
-ONE_JOINT = {"body": Chain((0.5, 0.5)), "guess": Fourier([0.0], [[1.0]], [[0.0]])}
-
-
-@pytest.mark.parametrize(("make", "words"), [
-    (lambda: problem(Polygon(4), scheme="trapezoid"), "gauss-N or radau-N"),
-    (lambda: problem(Polygon(6), intervals=8), "mesh is too small"),
-    (lambda: problem(Polygon(4), **ONE_JOINT), "three links"),
-    (lambda: problem(Polygon(4), guess=Corners(np.array([[0.1, -0.1], [0.0, 0.0]]))), "hardly moves"),
-    (lambda: problem(Polygon(4, "bilateral"), body=Chain((0.2, 0.3, 0.5))), "both ends"),
-    (lambda: Polygon(1), "corners"),
-    (lambda: Polygon(5, "antipodal"), "even"),
-    (lambda: Polygon(4, "bilateral", "edge"), "axis"),
-    (lambda: Corners(np.array([[1.0, 1.0], [0.0, 0.0]])), "equal neighbours"),
-    (lambda: Corners("triangle"), "numbers"),
-    (lambda: BSpline(1, 1), "knots"),
-])  # fmt: skip
-def test_unusable_problems_classes_and_gaits_are_refused_in_words(make, words):
-    with pytest.raises(ProblemError, match=words):
-        make()
 
 
 def test_problems_of_every_class_survive_their_description():

@@ -11,7 +11,10 @@ from tests.shared.laws import coulomb
 
 BODY = Chain()
 BILATERAL = Harmonic(1, "bilateral")
-SLOW = (0.01, 1, 1), (1, 0.01, 100), (0.01, 100, 1)
+SLOW = (
+    pytest.param(law, marks=pytest.mark.slow)
+    for law in ((0.01, 1, 1), (1, 0.01, 100), (0.01, 100, 1))
+)
 
 
 def replayed(gait, delta, **settings):
@@ -69,16 +72,7 @@ def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, del
     assert again.efficiency == pytest.approx(solution.certificate.efficiency, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    "law",
-    [
-        (100, 1, 1),
-        (1, 1 + 1e-15, 1),
-        (1, 100, 0.01),
-        *(pytest.param(law, marks=pytest.mark.slow) for law in SLOW),
-    ],
-    ids=str,
-)
+@pytest.mark.parametrize("law", [(100, 1, 1), (1, 1 + 1e-15, 1), (1, 100, 0.01), *SLOW], ids=str)
 def test_extreme_coefficients_are_solved_or_refused(law):
     friction = coulomb(*law)
     at = {"friction": friction, "gait": BILATERAL, "intervals": 12, "delta": 1e-3}

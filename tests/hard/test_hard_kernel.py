@@ -3,7 +3,7 @@ hard for both."""
 
 import numpy as np
 import pytest
-from cases import COEFFICIENTS, DELTAS, HARD
+from cases import ANGLES, COEFFICIENTS, DELTAS, RATES, SPEED
 
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.balance import instant, net_force, total_power
@@ -11,9 +11,6 @@ from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from research.guarantee.loaded_balance import loaded_balance
 from tests.shared.laws import coulomb
 
-ANGLES = np.array([angles for angles, _ in HARD.values()]).T
-RATES = np.array([rates for _, rates in HARD.values()]).T
-SPEED = np.abs(RATES).max(axis=0)
 LAWS = [(1.0, 1.0, 1.0), (1.7, 1.0, 1.3), (10.0, 1.0, 1.0), (0.5, 1.0, 5.0)]
 
 pytestmark = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")

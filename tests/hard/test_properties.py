@@ -125,9 +125,8 @@ def test_a_link_cut_by_a_frozen_joint_moves_as_before(case, law, exponent):
     cut = Chain((0.3 * first, first - 0.3 * first, *rest))
     still = np.zeros((1, 1))
     one = solved(body, law, angles, rates, 10.0**exponent)
-    other = solved(
-        cut, law, np.concatenate([still, angles]), np.concatenate([still, rates]), 10.0**exponent
-    )
+    longer = (np.concatenate([still, each]) for each in (angles, rates))
+    other = solved(cut, law, *longer, 10.0**exponent)
     np.testing.assert_allclose(other, one, atol=allowed(body, law, angles, rates, 10.0**exponent))
 
 

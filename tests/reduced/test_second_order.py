@@ -1,15 +1,21 @@
-"""Second-order conditions: optima have positive curvature on what is free, and a known saddle has
-not."""
+"""Second-order conditions: optima have positive curvature on what is free, a known saddle has not;
+and rows follow the worst instants of whatever gait they are asked for."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
+from colloc.gaits.starts import latin_hypercube_gait
 from colloc.mechanics.densities import Instants
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
+from colloc.search import optimise as converge
 from colloc.search.iterate import space_near
+from colloc.search.optimise import solve_subproblems
+from colloc.search.options import FINE, OPTIONS
 from tests.shared.stages import answer_near
 
 PROBLEM = Problem("bilateral", gait=Harmonic(1, "bilateral"), intervals=100)
@@ -26,15 +32,9 @@ class Quadratic:
     """x'Hx/2 on a plane or not, with its exact answer known."""
 
     def __init__(self, hessian, normal=None, upper=np.inf):
-        n = len(hessian)
-        self.hessian, self.lower, self.upper = (
-            np.array(hessian, dtype=float),
-            np.full(n, -9.0),
-            np.full(n, 9.0),
-        )
-        self.normal = (
-            np.zeros((0, n)) if normal is None else np.atleast_2d(np.array(normal, dtype=float))
-        )
+        n, self.hessian = len(hessian), np.array(hessian, dtype=float)
+        self.lower, self.upper = np.full(n, -9.0), np.full(n, 9.0)
+        self.normal = np.reshape(np.array([] if normal is None else normal, dtype=float), (-1, n))
         self.row_lower = self.row_upper = np.zeros(len(self.normal))
 
     def objective(self, v):
@@ -104,44 +104,27 @@ def test_the_worst_instant_moves_with_the_gait(b):
 def test_the_peak_of_a_moment_moves_with_the_gait():
     """The second derivative of the largest moment over time is that at its instant and what the
     move of the instant adds."""
-    problem = Problem(
-        "weak",
-        body=Chain((0.25,) * 4),
-        gait=Harmonic(1, "bilateral"),
-        torque_limit=0.06,
-        delta=1e-2,
-    )
+    gait, asked = Harmonic(1, "bilateral"), {"torque_limit": 0.06, "delta": 1e-2}
+    problem = Problem("weak", body=Chain((0.25,) * 4), gait=gait, **asked)
     space, v = space_near(problem, problem.guess)
     program = ReducedProgram(space, problem.delta)
     program.place_rows(v)
     (shares, points), names = program.actuators.placed, problem.path_limits.names
-    row = int(
-        np.argmax(
-            np.where(
-                shares == names.index("torque of joint 2"),
-                program.actuators.values(v, problem.delta),
-                -1,
-            )
-        )
-    )
+    second = shares == names.index("torque of joint 2")
+    row = int(np.argmax(np.where(second, program.actuators.values(v, problem.delta), -1)))
     cell = points[row] // space.mesh.scheme.s
     left, right = space.mesh.edges[cell : cell + 2]
 
     def moment(at, t):
         gait, body, t = space.member(at), problem.body, np.atleast_1d(t)
         angles, rates = gait(t)
-        z = body.solve(problem.friction, angles, rates, problem.delta).z
-        return problem.path_limits.at(
-            Instants(body, problem.friction, angles, rates, problem.delta, z=z)
-        )[1, 0]
+        at = body, problem.friction, angles, rates, problem.delta
+        return problem.path_limits.at(Instants(*at, z=body.solve(*at[1:]).z))[1, 0]
 
     def peak(at):
-        reach = {
-            "bounds": (2 * left - right, 2 * right - left),
-            "method": "bounded",
-            "options": {"xatol": 1e-12},
-        }
-        return minimize_scalar(lambda t: -moment(at, t), **reach).x
+        reach, finely = (2 * left - right, 2 * right - left), {"xatol": 1e-12}
+        how = {"bounds": reach, "method": "bounded", "options": finely}
+        return minimize_scalar(lambda t: -moment(at, t), **how).x
 
     here, on_rows = peak(v), np.zeros(program.row_lower.size)
     assert left < here < right
@@ -151,9 +134,7 @@ def test_the_peak_of_a_moment_moves_with_the_gait():
         step = 1e-3 * z / np.linalg.norm(z)
         largest = [moment(at, peak(at)) for at in (v - step, v, v + step)]
         there = [moment(at, here) for at in (v - step, v, v + step)]
-        moved = (
-            largest[0] - 2 * largest[1] + largest[2] - there[0] + 2 * there[1] - there[2]
-        ) / 1e-6
+        moved = (np.diff(largest, 2) - np.diff(there, 2))[0] / 1e-6
         assert moved > 1e-3
         assert step @ added @ step / 1e-6 == pytest.approx(moved, rel=1e-2)
 
@@ -169,9 +150,7 @@ def test_the_gait_between_two_ways_of_bending_is_a_saddle():
     step = 1e-3 * found.direction
     objective = [program.objective(v + k * step) for k in (-1, 0, 1)]
     assert objective[0] < objective[1] > objective[2]
-    assert (objective[0] - 2 * objective[1] + objective[2]) / 1e-6 == pytest.approx(
-        found.smallest, rel=1e-2
-    )
+    assert np.diff(objective, 2)[0] / 1e-6 == pytest.approx(found.smallest, rel=1e-2)
 
 
 def test_an_optimum_is_better_than_its_neighbours():
@@ -185,3 +164,73 @@ def test_an_optimum_is_better_than_its_neighbours():
     for direction in rng.normal(size=(10, v.size)):
         rise = program.objective(v + 0.01 * direction / np.linalg.norm(direction)) - here
         assert rise > 0.9 * 0.5e-4 * found.smallest
+
+
+BODIES = {
+    "none": Chain((0.3, 0.2, 0.15, 0.35)),
+    "bilateral": Chain((0.3, 0.2, 0.2, 0.3)),
+    "antipodal": Chain(),
+}
+
+
+@pytest.fixture(params=BODIES)
+def placed(request):
+    """A space with its checks placed for a gait that touches its limit, and a gait near it whose
+    worst instants are others."""
+    free = Problem("follow", body=BODIES[request.param], gait=Harmonic(3, request.param))
+    gait = latin_hypercube_gait(free, 0, 2)
+    limit = float(np.abs(gait.angles(np.linspace(0, 1, 1000))).max())
+    space, v = space_near(free.with_(joint_limit=limit + 1e-4, guess=gait), gait)
+    return space, v, v + 0.01 * np.random.default_rng(1).standard_normal(v.size)
+
+
+def names(constraints):
+    return [(kind, int(cell)) for kind, cells in constraints.kinds.items() for cell in cells]
+
+
+def test_rows_near_their_bounds_are_those_of_the_worst_instants_of_any_gait(placed):
+    """Held rows are off by what is of second order in the step; rows that are far from their bounds
+    are not followed."""
+    space, v, near = placed
+    held, there = space.constraints(v), space.constraints(near)
+    moving = dict(zip(names(held), held.following().values(near), strict=True))
+    anew = dict(zip(names(there), there.values(near), strict=True))
+    before = {
+        name: abs(value - anew[name])
+        for name, value in zip(names(held), held.values(near), strict=True)
+        if name in anew
+    }
+    after = {name: abs(moving[name] - anew[name]) for name in before}
+    assert all(after[name] <= before[name] + 1e-12 for name in after)
+    followed = [name for name in after if before[name] - after[name] > 1e-12]  # more than rounding
+    assert max(before[name] for name in followed) > 1e-5
+    assert max(after[name] for name in followed) < 1e-9
+
+
+def test_their_slopes_are_those_of_the_rows_that_move(placed):
+    space, v, near = placed
+    moving = space.constraints(v).following()
+    slopes, step = moving.slopes(near), 1e-6
+    for direction in np.random.default_rng(2).standard_normal((3, near.size)):
+        along = (
+            moving.values(near + step * direction) - moving.values(near - step * direction)
+        ) / (2 * step)
+        np.testing.assert_allclose(
+            slopes @ direction, along, atol=2e-6 * np.abs(slopes).max() + 2e-6
+        )
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_a_gait_comes_to_rest_at_limits_that_it_touches_for_an_instant(follows, monkeypatch):
+    """With the instants held it swings: every round is optimal for the instants of the one
+    before."""
+    if not follows:
+        monkeypatch.setattr(ReducedProgram, "follow_worst", lambda held: None)
+    monkeypatch.setattr(converge, "OPTIONS", replace(OPTIONS, radius=0.5))
+    body, friction = Chain((0.25, 0.25, 0.25, 0.25)), Friction(mu_t=0.4, mu_f=1, mu_b=1)
+    problem = Problem(
+        "touch", body=body, friction=friction, gait=Harmonic(4), joint_limit=2.5, intervals=20
+    )
+    space, v = space_near(problem, latin_hypercube_gait(problem, 0, 0))
+    conditions = solve_subproblems(ReducedProgram(space, 0.02), v, FINE).conditions
+    assert (max(conditions.kkt_error, conditions.violation) < 1e-6) == follows

@@ -1,6 +1,8 @@
 """The collocated motion on a slope: against the differential equation, differences, and the full
 program."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -22,9 +24,7 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import fields, gait_from
 from colloc.reduced.program import ReducedProgram
-from colloc.search.ipopt import Solver
 from colloc.search.iterate import space_near
-from colloc.transcription.full_program import FullProgram
 from colloc.verification.differential_motion import slope_motion
 
 
@@ -38,13 +38,8 @@ SKEW = Problem(
     friction=Friction(mu_t=1.7, mu_b=1.3), gait=Harmonic(2), grade=0.4,
     intervals=60,
 )  # fmt: skip
-FEET = SKEW.with_(
-    name="feet",
-    body=Chain((0.2, 0.5, 0.3), masses=(0.4, 0.3, 0.3), feet=(Foot(0), Pad(1, 0.1, 0.6), Wheel(2,
-    rolling=0.5))),
-    grade=0.2,
-)  # fmt: skip
-
+PARTS = {"feet": (Foot(0), Pad(1, 0.1, 0.6), Wheel(2, rolling=0.5)), "masses": (0.4, 0.3, 0.3)}
+FEET = SKEW.with_(name="feet", body=Chain((0.2, 0.5, 0.3), **PARTS), grade=0.2)
 SNAKE = SKEW.with_(name="snake", gait=Serpenoid(2), guess=None)
 SPLINE = SKEW.with_(name="spline", gait=BSpline(7, degree=3), guess=None)
 SIDES = SKEW.with_(name="sides", gait=Polygon(5), guess=None)
@@ -69,44 +64,28 @@ def program_at(problem, delta):
 def test_the_mesh_has_the_motion_of_the_differential_equation(problem):
     program, v = program_at(problem.with_(intervals=120), 0.1)
     gait = program.space.member(v)
-    at = (
-        problem.body,
-        problem.friction,
-        gait,
-        delta_per_period(problem.gait, gait, 0.1),
-        problem.grade,
-    )
+    delta = delta_per_period(problem.gait, gait, 0.1)
+    at = problem.body, problem.friction, gait, delta, problem.grade
     ran = slope_motion(*at, breaks=gait.corner_phases)
     found = program.motion.values(v, 0.1)
-    for name, exact in (
-        ("distance", ran.climb),
-        ("work", ran.joint_work),
-        ("rotation", ran.turn),
-        ("across", ran.aside),
-    ):
-        assert found[name] == pytest.approx(float(np.squeeze(exact)), abs=1e-5), name
+    exact = {"distance": ran.climb, "work": ran.joint_work, "rotation": ran.turn}
+    for name, value in (exact | {"across": ran.aside}).items():
+        assert found[name] == pytest.approx(float(np.squeeze(value)), abs=1e-5), name
 
 
 @pytest.mark.parametrize(
     ("problem", "asked"),
     [
-        *(
-            (problem, asked)
-            for problem in (LEVEL, FEET, SPLINE, SNAKE)
-            for asked in (NOTHING_MORE, PACED)
-        ),
-        *((SIDES, asked) for asked in (NOTHING_MORE, ACROSS)),
+        *itertools.product((LEVEL, FEET, SPLINE, SNAKE), (NOTHING_MORE, PACED)),
+        *itertools.product((SIDES,), (NOTHING_MORE, ACROSS)),
     ],
 )
 def test_gradients_are_the_limit_of_differences(problem, asked):
     towards, objective, limits = asked
     program, v = program_at(problem.with_(towards=towards, objective=objective, **limits), 0.05)
     assert program.actuators.placed.shape[1] > 10
-    slopes, gradient, rows = (
-        program.motion.gradients(v, 0.05),
-        program.gradient(v),
-        program.row_slopes(v),
-    )
+    slopes = program.motion.gradients(v, 0.05)
+    gradient, rows = program.gradient(v), program.row_slopes(v)
     for k in range(v.size):
         step = 1e-5 * np.eye(v.size)[k]
         there, back = (program.motion.values(v + side * step, 0.05) for side in (1, -1))
@@ -114,35 +93,8 @@ def test_gradients_are_the_limit_of_differences(problem, asked):
             assert slope[k] == pytest.approx((there[name] - back[name]) / 2e-5, abs=3e-6), name
         change = program.objective(v + step) - program.objective(v - step)
         assert gradient[k] == pytest.approx(change / 2e-5, abs=3e-5)
-        np.testing.assert_allclose(
-            rows[:, k], (program.rows(v + step) - program.rows(v - step)) / 2e-5, atol=3e-5
-        )
-
-
-@pytest.mark.parametrize(
-    ("problem", "towards"),
-    [
-        (SKEW, None),
-        (SNAKE, None),
-        (FEET.with_(torque_limit=5.0), 2.0),
-        (SIDES.with_(torque_limit=5.0), 2.0),
-        (SIDES, None),
-    ],
-)
-def test_the_full_program_holds_where_the_reduced_one_is_evaluated(problem, towards):
-    """Every equation but those that the gait has still to be found for: no turn, no way across."""
-    program, v = program_at(problem.with_(towards=towards, objective="driven efficiency"), 0.05)
-    full = FullProgram(
-        program.space.control, program.space.full_parameters(v), program.space.mesh.edges
-    )
-    x = full.feasible(program.space.full_parameters(v), 0.05)
-    found = Solver(full).measured(x, 0.05, np.zeros_like(x), np.zeros_like(full.row_lower))
-    off = {name for name, rows in full.groups.items() if found.excess[rows].max(initial=0.0) > 1e-7}
-    assert off == ({"rotation"} if towards is None else {"rotation", "across"})
-    assert found.objective == pytest.approx(program.objective(v), abs=1e-12)
-    assert found.excess[full.groups["rotation"]][0] == pytest.approx(
-        abs(program.motion.values(v, 0.05)["rotation"]), abs=1e-9
-    )
+        change = program.rows(v + step) - program.rows(v - step)
+        np.testing.assert_allclose(rows[:, k], change / 2e-5, atol=3e-5)
 
 
 @pytest.mark.parametrize("problem", [SKEW, SPLINE, SIDES], ids=lambda p: p.name)

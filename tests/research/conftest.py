@@ -10,16 +10,10 @@ from research.guarantee.c_compiler import c_compiler
 
 @cache
 def knows_cpp():
-    compiler = c_compiler()
-    if compiler is None:
+    command = [c_compiler(), "-x", "c++", "-fsyntax-only", "-"]
+    if command[0] is None:
         return False
-    command = [compiler, "-x", "c++", "-fsyntax-only", "-"]
-    return (
-        subprocess.run(
-            command, input=b"#include <cmath>\n", capture_output=True, check=False
-        ).returncode
-        == 0
-    )
+    return not subprocess.run(command, input=b"#include <cmath>\n", capture_output=True).returncode
 
 
 @pytest.fixture(autouse=True)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shared.address_sanitizer import stays_within_its_arrays
 
 from colloc.bounds.motions import CoulombMotion, Domain, balanced_motion
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
@@ -18,11 +19,18 @@ from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel, numpy_instead
 from colloc.system.errors import ProblemError
 from research.guarantee import enclosure, guaranteed
-from research.guarantee.enclosure import CORNERS, DELTA, by_convexity, by_loads, corner_motions
+from research.guarantee.enclosure import (
+    CORNERS,
+    DELTA,
+    Cells,
+    ReferencePoint,
+    by_convexity,
+    by_loads,
+    corner_motions,
+)
 from research.guarantee.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
 from research.guarantee.loaded_balance import loaded_balance
 from research.guarantee.potential_range import PotentialRange, turned
-from tests.research.random_cells import all_cells, random_cells
 
 BODY, UNIT = Chain(), Friction()
 KAPPA = np.sqrt(2) - 1
@@ -42,17 +50,37 @@ def potential(bound) -> PotentialRange:
     return PotentialRange(bound.potential_space(BODY), np.array(bound.coefficients))
 
 
+def all_cells(low, sizes):
+    """Cells that share no corners."""
+    points = (low[:, :, None] + sizes[:, :, None] * CORNERS.T[:, None, :]).reshape(3, -1)
+    return Cells(low, sizes, points, np.arange(points.shape[1]).reshape(-1, 8))
+
+
+def random_cells(body, friction, size, seed, thin=False, count=8):
+    """Cells for any body, motions at their corners and a reference point that has nothing to do
+    with a potential."""
+    rng = np.random.default_rng(seed)
+    low, sizes = (
+        rng.uniform(-1, 1, (3, count)) * [[2.5], [2.5], [0.9]],
+        size * rng.uniform(0.7, 1.3, (3, count)),
+    )
+    if thin:
+        low[2] = 10.0 ** rng.uniform(-9, -3, count)
+        sizes[2] = low[2] * 3.0
+    at, centre = rng.normal(size=(2, 8 * count)), rng.normal(size=(2, count))
+    reference = ReferencePoint(
+        at[0] + 1j * at[1], centre[0] + 1j * centre[1], *rng.uniform(0.1, 1, (3, count))
+    )
+    cells = all_cells(low, sizes)
+    return cells, corner_motions(body, friction, cells), reference
+
+
 def boxes(potential, size, count, seed, thin=False):
     """Random cells that no knot cuts; near the plane s = 0, where one joint turns alone, if
     thin."""
     rng, knots = np.random.default_rng(seed), potential.spline.knots
-    low = np.stack(
-        [
-            rng.uniform(0, np.pi - size, count),
-            rng.uniform(-np.pi, np.pi - size, count),
-            rng.uniform(-1, 1 - size, count),
-        ]
-    )
+    least, most = np.array([[0, -np.pi, -1], [np.pi - size, np.pi - size, 1 - size]])[..., None]
+    low = rng.uniform(least, most, (3, count))
     sizes = np.full((3, count), size)
     if thin:
         low[2] = 10.0 ** rng.uniform(-8, -3, count)
@@ -106,9 +134,8 @@ def test_loaded_forces_bound_the_power_from_below():
     state = loaded_balance(BODY, UNIT, q, r, load, np.zeros((3, n)), DELTA)
     beta_r = proved_at(q, r, state, load)[1]
     for _ in range(20):
-        other = loaded_balance(
-            BODY, UNIT, q, r, np.zeros((3, n)), rng.uniform(-1, 1, (3, n)) * 0.3, 1e-12, steps=0
-        )
+        z = rng.uniform(-1, 1, (3, n)) * 0.3
+        other = loaded_balance(BODY, UNIT, q, r, np.zeros((3, n)), z, 1e-12, steps=0)
         assert np.all(other.potential >= beta_r + (load * other.velocity).sum(axis=0) - 1e-7)
 
 
@@ -266,10 +293,9 @@ def test_what_a_motion_inside_may_gain_more_and_pay_less_than_at_the_corners_rai
     cells, other = boxes(potential, 0.01, 100, 41), ({"by_convexity", "by_loads"} - {way}).pop()
 
     def bound_with(gain, power):
-        allowed = enclosure.Allowance(
-            *(np.full(cells.low.shape[1], 0.0) + value for value in (gain, power))
-        )
-        unknown = enclosure.Allowance(*(np.full(cells.low.shape[1], np.inf) for _ in range(2)))
+        none = np.zeros(cells.low.shape[1])
+        allowed = enclosure.Allowance(none + gain, none + power)
+        unknown = enclosure.Allowance(none + np.inf, none + np.inf)
         monkeypatch.setattr(guaranteed, way, lambda *_: allowed)
         monkeypatch.setattr(guaranteed, other, lambda *_: unknown)
         return cell_bounds(BODY, UNIT, potential, cells, 0.0)
@@ -280,15 +306,10 @@ def test_what_a_motion_inside_may_gain_more_and_pay_less_than_at_the_corners_rai
         potential.corner_gain(cells, motions)[cells.at]
         + potential.trial_error(cells, motions)[:, None]
     )
-    for more, less in (
-        (0.0, 0.0),
-        (0.02, 0.0),
-        (0.0, 0.1 * power.min()),
-        (0.02, 0.9 * power.min()),
-    ):
-        np.testing.assert_allclose(
-            bound_with(more, less), ((gain + more) / (power - less)).max(axis=1), rtol=2e-9
-        )
+    for more, share in ((0.0, 0.0), (0.02, 0.0), (0.0, 0.1), (0.02, 0.9)):
+        less = share * power.min()
+        known = ((gain + more) / (power - less)).max(axis=1)
+        np.testing.assert_allclose(bound_with(more, less), known, rtol=2e-9)
     assert (bound_with(0.0, 0.5 * (power.min(axis=1) + power.max(axis=1))) == np.inf).all()
 
 
@@ -312,9 +333,7 @@ def test_a_cell_whose_bound_is_not_a_number_stays_open(bound, potential, monkeyp
 
     def broken(*given):
         state = loaded_balance(*given)
-        return state._replace(
-            velocity=np.full_like(state.velocity, np.nan), power=np.full_like(state.power, np.nan)
-        )
+        return state._replace(velocity=np.nan * state.velocity, power=np.nan * state.power)
 
     monkeypatch.setattr(enclosure, "loaded_balance", broken)
     assert np.all(cell_bounds(BODY, UNIT, potential, cells, 0.0) == np.inf)
@@ -326,13 +345,10 @@ def test_a_cell_whose_bound_is_not_a_number_stays_open(bound, potential, monkeyp
     assert certificate.guaranteed == np.inf
 
 
-def stated(bound, body=BODY, friction=None):
+def stated(bound, friction=UNIT):
     """Domain and potential of a bound, as `certify` takes them."""
-    return (
-        Domain(body, friction or Friction(), bound.joint_limit),
-        bound.potential_space(body),
-        np.array(bound.coefficients),
-    )
+    domain = Domain(BODY, friction, bound.joint_limit)
+    return domain, bound.potential_space(BODY), np.array(bound.coefficients)
 
 
 @needs_kernel
@@ -374,15 +390,10 @@ def test_parts_share_the_cells_and_these_fill_the_domain(bound, monkeypatch):
     )
     assert sum(counts) == low.shape[1] == np.unique(low.round(12), axis=1).shape[1]
     rng = np.random.default_rng(42)
-    for q1, q2, s in np.stack(
-        [rng.uniform(0, 1.4, 50), rng.uniform(-np.pi, 1.4, 50), rng.uniform(-1, 1, 50)], axis=1
-    ):
-        point = np.array([q1, q2, s])[:, None]
-        assert ((low <= point) & (point <= low + size)).all(axis=0).any()
-    for s in (-1e-10, 1e-10, 1e-7, -1e-5):
-        assert (
-            ((low <= [[1.0], [0.5], [s]]) & ([[1.0], [0.5], [s]] <= low + size)).all(axis=0).any()
-        )
+    points = rng.uniform([0, -np.pi, -1], [1.4, 1.4, 1], (50, 3))
+    for point in (*points, *([1.0, 0.5, s] for s in (-1e-10, 1e-10, 1e-7, -1e-5))):
+        at = np.reshape(point, (3, 1))
+        assert ((low <= at) & (at <= low + size)).all(axis=0).any()
 
 
 @needs_kernel
@@ -403,11 +414,7 @@ def test_a_potential_says_the_same_of_a_body_turned_end_for_end(friction):
     np.testing.assert_allclose(ratios[0], ratios[1], rtol=1e-4, atol=1e-4)
 
 
-@pytest.mark.parametrize(
-    "body",
-    [BODY, Chain((0.4, 0.25, 0.35)), Chain((0.25, 0.3, 0.45))],
-    ids=["equal", "long", "one long"],
-)
+@pytest.mark.parametrize("body", [BODY, Chain((0.4, 0.25, 0.35)), Chain((0.25, 0.3, 0.45))])
 def test_no_box_is_left_out_that_holds_a_shape_without_crossing(body):
     """By plain intersection of segments at random shapes inside; and boxes well inside the crossing
     are left out."""
@@ -463,20 +470,12 @@ def test_out_of_time_says_what_is_proved_so_far(bound):
 @pytest.mark.parametrize(
     ("body", "friction", "harmonics"),
     [
-        (BODY, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), (1,)),
+        (BODY, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), (1,)),  # no convex potential
         (Chain((0.25,) * 4), Friction(), (1,)),
         (Chain(weights=(0.25, 0.5, 0.25)), Friction(), (1,)),
         (BODY, Friction(), (0, 1)),
-        (BODY, Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0), (0, 1)),
-        (BODY, Friction(), (3,)),
-    ],
-    ids=[
-        "no convex potential",
-        "four links",
-        "weights",
-        "even harmonics",
-        "those of a reversible law",
-        "no displacement",
+        (BODY, Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0), (0, 1)),  # harmonics of a reversible law
+        (BODY, Friction(), (3,)),  # no displacement
     ],
 )
 def test_what_the_proof_does_not_cover_is_refused(body, friction, harmonics):
@@ -513,3 +512,31 @@ def test_finite_delta_costs_at_most_delta_in_dissipation_and_in_power(delta):
     assert np.all(soft.power <= soft.potential + 1e-7)
     # and not vacuously: motions do change
     assert np.max(there.potential - least) > 1e-3 * delta
+
+
+WITHIN_ITS_ARRAYS = """
+import numpy as np
+from colloc import Chain, Friction
+from research.guarantee import kernel
+from research.guarantee.enclosure import CORNERS, Cells, ReferencePoint, by_convexity, corner_motions
+from research.guarantee.loaded_balance import loaded_balance
+
+kernel.FLAGS += ("-O1", "-fsanitize=address")
+rng = np.random.default_rng(0)
+for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
+    body, n = Chain(lengths), len(lengths) - 1
+    at = rng.uniform(-3, 3, (n, 20)), rng.normal(size=(n, 20))
+    loaded_balance(body, Friction(), *at, 0.1 * rng.normal(size=(3, 20)), np.zeros((3, 20)), 1e-4)
+size = np.full((3, 20), 0.01)
+low = rng.uniform(-1, 1, (3, 20))
+points = (low[:, :, None] + size[:, :, None] * CORNERS.T[:, None]).reshape(3, -1)
+cells = Cells(low, size, points, np.arange(160).reshape(20, 8))
+point = ReferencePoint(np.zeros(160), *np.zeros((4, 20)))
+by_convexity(Chain(), Friction(), cells, corner_motions(Chain(), Friction(), cells), point)
+"""
+
+
+@needs_kernel
+@pytest.mark.slow
+def test_it_reads_and_writes_nothing_beyond_its_arrays():
+    stays_within_its_arrays(WITHIN_ITS_ARRAYS)

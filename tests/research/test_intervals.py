@@ -47,56 +47,36 @@ def test_operations_hold_the_exact_results_of_all_that_their_operands_hold(tmp_p
             for x, y in ((x, y) for x in map(Fraction, row[:2]) for y in map(Fraction, row[2:])):
                 p, q = (mpmath.mpf(z.numerator) / z.denominator for z in (x, abs(y)))
                 exact = [x + y, x - y, x * y, x / y, x * x]
-                far = [mpmath.sqrt(abs(p)), mpmath.asinh(p / q), mpmath.log(q)] + [
-                    mpmath.sin(p)
-                ] * (x == row[0])
-                assert all(
-                    Fraction(lo) <= z <= Fraction(hi)
-                    for z, (lo, hi) in zip(exact, held, strict=False)
-                )
+                far = [mpmath.sqrt(abs(p)), mpmath.asinh(p / q), mpmath.log(q)]
+                far += [mpmath.sin(p)] * (x == row[0])
+                bounds = ((Fraction(lo), Fraction(hi)) for lo, hi in held)
+                assert all(lo <= z <= hi for z, (lo, hi) in zip(exact, bounds, strict=False))
                 assert all(lo <= z <= hi for z, (lo, hi) in zip(far, held[5:], strict=False))
-    width = (found[:, :, 1] - found[:, :, 0])[::6]
-    assert (
-        width[:, [0, 2, 3, 4, 5, 8]] <= 1e-14 * np.abs(found[::6, [0, 2, 3, 4, 5, 8], 1]) + 1e-14
-    ).all()
+    low, high = np.moveaxis(found[::6, [0, 2, 3, 4, 5, 8]], -1, 0)
+    assert (high - low <= 1e-14 * np.abs(high) + 1e-14).all()
 
 
 def exact_state(lengths, sigma, point, z, load):
     """Dissipation, forces (along, across, moment about the hinge) of each link, sum phi . B r,
     force and torque left over."""
     mp, total, forces, left = mpmath.mpf, mpmath.mpf(0), [], [mpmath.mpf(float(x)) for x in load]
-    q, s, z, side = (
-        [mp(float(x)) for x in point[:2]],
-        mp(float(point[2])),
-        [mp(float(x)) for x in z],
-        mp(float(lengths[1])) / 2,
-    )
-    for angle, at, spin, sense, l in zip(
-        (q[0], 0, -q[1]),
-        (-side, -side, side),
-        (1 - z[2], z[2], z[2] + s),
-        (-1, 1, 1),
-        lengths,
-        strict=True,
-    ):
+    *q, s = (mp(float(x)) for x in point)
+    z, side = [mp(float(x)) for x in z], mp(float(lengths[1])) / 2
+    places, spins = (-side, -side, side), (1 - z[2], z[2], z[2] + s)
+    links = zip((q[0], 0, -q[1]), places, spins, (-1, 1, 1), lengths, strict=True)
+    for angle, at, spin, sense, l in links:
         hinge = mpmath.expj(angle) * mpmath.mpc(z[0], z[1] + at * z[2])
         by, l, y0 = mp(float(sigma[0 if hinge.real > 0 else 1])), mp(float(l)), hinge.imag
         x, y1 = by * hinge.real, y0 + l * spin
-        a, r0, r1 = (
-            mpmath.sqrt(x**2 + mp(DELTA) ** 2),
-            *(mpmath.sqrt(x**2 + y**2 + mp(DELTA) ** 2) for y in (y0, y1)),
-        )
+        a, r0, r1 = (mpmath.sqrt(x**2 + y**2 + mp(DELTA) ** 2) for y in (0, y0, y1))
         arc = (mpmath.asinh(y1 / a) - mpmath.asinh(y0 / a)) / spin
         whole, first = ((y1 * r1 - y0 * r0) / spin + a**2 * arc) / 2, (r1 - r0) / spin
         force = by * x * arc, first, (whole - a**2 * arc - y0 * first) / spin
         total += whole
         forces.append(force)
         push = mpmath.expj(-angle) * mpmath.mpc(*force[:2])
-        left = [
-            left[0] - push.real,
-            left[1] - push.imag,
-            left[2] - at * push.imag - sense * force[2],
-        ]
+        moment = at * push.imag + sense * force[2]
+        left = [a - b for a, b in zip(left, (push.real, push.imag, moment), strict=True)]
     flat = [each for force in forces for each in force]
     return [total, *flat, forces[0][2] + s * forces[2][2], mpmath.hypot(*left[:2]), abs(left[2])]
 
@@ -116,9 +96,8 @@ def test_what_is_stated_of_a_corner_holds_what_it_is_to_sixty_digits(friction):
     found = states(body, friction, points, z, load).reshape(n, 13, 2)
     with mpmath.workdps(60):
         for i in range(n):
-            exact = exact_state(
-                body.lengths, (friction.mu_f, friction.mu_b), points[:, i], z[:, i], load[:, i]
-            )
+            at = (friction.mu_f, friction.mu_b), points[:, i], z[:, i], load[:, i]
+            exact = exact_state(body.lengths, *at)
             assert all(lo <= each <= hi for each, (lo, hi) in zip(exact, found[i], strict=True))
     assert np.median(found[:, :, 1] - found[:, :, 0]) < 1e-13
 
@@ -144,10 +123,8 @@ def test_growth_of_a_short_arc_is_never_more_than_it_is_and_nearly_as_much(tmp_p
     too."""
     (tmp_path / "piece.cpp").write_text(PIECE)
     headers = {each.name: each.read_text("ascii") for each in kernel.SOURCES.glob("*.hpp")}
-    library, rng = (
-        compiled_library(tmp_path / "piece.cpp", kernel.proof_flags(), headers),
-        np.random.default_rng(73),
-    )
+    library = compiled_library(tmp_path / "piece.cpp", kernel.proof_flags(), headers)
+    rng, (nodes, weights) = np.random.default_rng(73), np.polynomial.legendre.leggauss(8)
     library.piece.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_void_p]
     for turn in 10.0 ** rng.uniform(-6, -2.6, 40):
         vs, y = rng.normal(size=2)
@@ -157,11 +134,8 @@ def test_growth_of_a_short_arc_is_never_more_than_it_is_and_nearly_as_much(tmp_p
         library.piece(mean.ctypes.data, begin, begin + length, found.ctypes.data)
         lower = np.tril(found[:, :, 1])
         form = lower + lower.T - np.diag(np.diag(lower))
-        s = begin + length * (0.5 + 0.5 * np.polynomial.legendre.leggauss(8)[0])
-        weight, V = (
-            0.5 * length * np.polynomial.legendre.leggauss(8)[1],
-            np.stack([0 * s + vs, mean[1] + w * s]),
-        )
+        s, weight = begin + length * (0.5 + 0.5 * nodes), 0.5 * length * weights
+        V = np.stack([0 * s + vs, mean[1] + w * s])
         for about in (*rng.uniform(0, 0.3, 3), begin, begin + 0.5 * length):
             spin = rng.normal()
             d = np.array([0.01 * spin * rng.normal(), -spin * about, spin])

@@ -25,12 +25,8 @@ def cells():
     """Oblong ones, none of which a knot cuts, with s of both signs."""
     rng = np.random.default_rng(4)
     size = np.array([[0.05], [0.02], [0.3]]) * rng.uniform(0.5, 1, (3, N))
-    low = np.stack(
-        [
-            *(rng.integers(-2, 2, (2, N)) * np.pi / 2 + rng.uniform(0.1, 1.4, (2, N))),
-            rng.uniform(-1, 0.7, N),
-        ]
-    )
+    places = rng.integers(-2, 2, (2, N)) * np.pi / 2 + rng.uniform(0.1, 1.4, (2, N))
+    low = np.stack([*places, rng.uniform(-1, 0.7, N)])
     points = (low[:, :, None] + size[:, :, None] * CORNERS.T[:, None, :]).reshape(3, -1)
     return Cells(low, size, points, np.arange(8 * N).reshape(N, 8))
 
@@ -73,18 +69,14 @@ def test_what_is_stated_of_a_harmonic_and_of_its_gain_holds_what_they_are_in_fra
             x, y, spin = (Fraction(v) for v in z[:, n])
             for part in (0, 1):
                 real, value, rate = (np.real, np.imag)[part], [0, 0], 0
-                for (i, (a, da)), (j, (b, db)) in itertools.product(
-                    enumerate(first), enumerate(second)
-                ):
+                pairs = itertools.product(enumerate(first), enumerate(second))
+                for (i, (a, da)), (j, (b, db)) in pairs:
                     if a * b:
                         both = Fraction(table[i, j].real), Fraction(table[i, j].imag)
                         value = [v + a * b * each for v, each in zip(value, both, strict=True)]
                         rate += (da * b + Fraction(s) * a * db) * both[part]
-                gain = (
-                    rate
-                    + (k * spin * value[0] if part else -k * spin * value[1])
-                    + ((x, y)[part] if k == 1 else 0)
-                )
+                turned = k * spin * value[0] if part else -k * spin * value[1]
+                gain = rate + turned + ((x, y)[part] if k == 1 else 0)
                 for exact, (near, off) in zip((value[part], gain), stated, strict=True):
                     assert abs(exact - Fraction(float(real(near[n])))) <= Fraction(off[n])
         assert max(off.max() for _, off in stated) < 1e-13
@@ -94,9 +86,8 @@ def test_the_gain_over_all_headings_is_bounded_from_above_and_closely():
     rng = np.random.default_rng(41)
     amplitudes = {k: rng.normal(size=40) + 1j * rng.normal(size=40) for k in (1, 3, 5)}
     theta = np.linspace(0, 2 * np.pi, 20001)
-    fine = sum(np.real(a[:, None] * np.exp(1j * k * theta)) for k, a in amplitudes.items()).max(
-        axis=1
-    )
+    waves = (np.real(a[:, None] * np.exp(1j * k * theta)) for k, a in amplitudes.items())
+    fine = sum(waves).max(axis=1)
     assert np.all(gain_bound(amplitudes) >= fine)
     assert np.all(gain_bound(amplitudes) <= fine * 1.005)
 
@@ -120,19 +111,14 @@ def test_the_error_of_a_trial_motion_is_that_of_interpolating_slopes_and_product
         i, j = (int(np.searchsorted(potential.spline.knots, q, side="right")) - 1 for q in place)
         total = 0.0
         for k in (1, 3):
-            largest = {
-                order: table[i, j]
-                for (harmonic, order), table in potential.largest.items()
-                if harmonic == k
-            }
+            tables = potential.largest.items()
+            largest = {order: table[i, j] for (own, order), table in tables if own == k}
             for axis in (0, 1):
                 h, change = cells.size[axis, n], np.abs(np.diff(spin, axis=axis)).max()
                 twice, once = ((2, 0), (1, 0)) if axis == 0 else ((0, 2), (0, 1))
                 rate = largest[twice[0] + 1, twice[1]] + s * largest[twice[0], twice[1] + 1]
-                product = (
-                    h**2 / 8 * np.abs(spin).max() * largest[twice] + h / 4 * change * largest[once]
-                )
-                total += h**2 / 8 * rate + k * product
+                product = h**2 / 8 * np.abs(spin).max() * largest[twice]
+                total += h**2 / 8 * rate + k * (product + h / 4 * change * largest[once])
         assert found[n] == pytest.approx(total, rel=1e-8)
 
 
@@ -148,17 +134,13 @@ def test_a_reference_point_is_the_first_harmonic_and_all_else_is_beside_it(poten
         bent = [potential.largest[1, order][i, j] for order in ((2, 0), (0, 2))]
         assert found.centre[n] == pytest.approx(value(potential, 1, centre), rel=1e-8)
         for corner in cells.at[n]:
-            assert found.at[corner] == pytest.approx(
-                value(potential, 1, cells.points[:2, corner]), rel=1e-8
-            )
-        third = abs(value(potential, 3, centre))
-        assert found.beside[n] == pytest.approx(
-            0.5 * across[1] + 3 * (0.5 * across[3] + third), rel=1e-8
-        )
+            known = value(potential, 1, cells.points[:2, corner])
+            assert found.at[corner] == pytest.approx(known, rel=1e-8)
+        beside = 0.5 * across[1] + 3 * (0.5 * across[3] + abs(value(potential, 3, centre)))
+        assert found.beside[n] == pytest.approx(beside, rel=1e-8)
         assert found.change[n] == pytest.approx(across[1], rel=1e-8)
-        assert found.curvature[n] == pytest.approx(
-            (cells.size[:2, n] ** 2 / 8 * bent).sum(), rel=1e-8
-        )
+        curvature = (cells.size[:2, n] ** 2 / 8 * bent).sum()
+        assert found.curvature[n] == pytest.approx(curvature, rel=1e-8)
 
 
 @pytest.mark.parametrize("order", [(1, 0), (0, 1), (2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)])

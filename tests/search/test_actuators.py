@@ -1,4 +1,5 @@
-"""What joints have to do, and gaits of joints that cannot do everything."""
+"""What joints have to do, with inertia and without: identities of torques and powers; and gaits of
+joints that cannot do everything."""
 
 import re
 
@@ -6,9 +7,25 @@ import numpy as np
 import pytest
 from shared.instants import random_instants
 
-from colloc import Chain, Friction, Harmonic, PowerLaw, Problem, Viscous, ellipse, replay
+from colloc import (
+    Chain,
+    Fourier,
+    Friction,
+    Harmonic,
+    PowerLaw,
+    Problem,
+    Viscous,
+    ellipse,
+    evaluate,
+    replay,
+)
+from colloc.dynamics.chain import joint_torques, torque_function
 from colloc.mechanics.balance import instant, joint_moments
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
+from colloc.mechanics.friction import LinkVelocity
+from colloc.mechanics.inertia import inertial_moments, kinetic_energy, momentum_rates, tail_velocity
+from colloc.results.limit_use import lines
+from colloc.results.robot import joint_torques as sheet_torques
 from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
 
@@ -49,11 +66,9 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
     angles, rates = random_instants(50)
     slow, fast = (moments(BODY, LAW, angles, pace * rates, pace * 1e-3)[0] for pace in (1.0, 2.0))
     np.testing.assert_allclose(fast, slow, rtol=1e-7, atol=1e-9)
-    drag = [
-        moments(Chain(), Viscous(normal=2, tangential=1), angles, pace * rates, 1e-3)[0]
-        for pace in (1.0, 2.0)
-    ]
-    np.testing.assert_allclose(drag[1], 2 * drag[0], rtol=1e-9)
+    at = Chain(), Viscous(normal=2, tangential=1), angles
+    slowly, fast = (moments(*at, pace * rates, 1e-3)[0] for pace in (1.0, 2.0))
+    np.testing.assert_allclose(fast, 2 * slowly, rtol=1e-9)
     z = BODY.solve(LAW, angles, rates, 1e-3).z
     powers = Instants(BODY, LAW, angles, rates, 1e-3, z=z).power
     np.testing.assert_allclose(powers, slow * rates, rtol=1e-12)
@@ -61,11 +76,7 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
 
 @pytest.mark.parametrize(
     ("law", "degree"),
-    [
-        (LAW, 0),
-        (PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), 0.5),
-        (Viscous(normal=2, tangential=1), 1),
-    ],
+    [(LAW, 0), (PowerLaw(0.5, mu_t=2.0), 0.5), (Viscous(normal=2, tangential=1), 1)],
     ids=str,
 )
 def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
@@ -110,10 +121,7 @@ def test_motors_may_brake_harder_than_they_may_drive_but_turn_no_harder_either_w
     brakes = now.chosen(np.array([instant]))
     power, torque = np.full(2, 100.0), np.full(2, 100.0)
     power[joint], torque[joint] = -0.5 * brakes.power[joint, 0], 0.5 * abs(brakes.moment[joint, 0])
-    for limit, share in (
-        ({"power_limit": tuple(power)}, 1.0),
-        ({"torque_limit": tuple(torque)}, 2.0),
-    ):
+    for limit, share in (({"power_limit": (*power,)}, 1.0), ({"torque_limit": (*torque,)}, 2.0)):
         limits = Problem("brakes", body=BODY, gait=Harmonic(1), **limit).path_limits
         most = limits.sizes(limits.at(brakes)).max()
         assert most == pytest.approx(share) if share > 1 else most < share, limit
@@ -140,12 +148,8 @@ def test_a_certificate_fails_a_gait_whose_joints_do_more_than_they_can(weak):
 
 @pytest.mark.slow
 def test_a_middle_joint_may_be_weaker_than_the_best_gait_wants_and_multipliers_price_it():
-    problem = Problem(
-        "four",
-        body=Chain((0.25,) * 4),
-        gait=Harmonic(1, "bilateral"),
-        torque_limit=(0.1, 0.047, 0.1),
-    )
+    body, limit = Chain((0.25,) * 4), {"torque_limit": (0.1, 0.047, 0.1)}
+    problem = Problem("four", None, body, gait=Harmonic(1, "bilateral"), **limit)
     found = solve(problem.with_(guess=solve(problem.with_(torque_limit=None), 1).gait), 1)
     assert found.status == "solved"
     # the price of a limit is the sum of the multipliers of its rows: shares are moments over it
@@ -167,7 +171,7 @@ HOPELESS = {
         {"torque_limit": 0.01},
         r"torque of joint \d is 0\.01 weight x body length, and .* 5",
     ),
-    "as far": ({"power_limit": 0.1, "at_least": {"distance": 0.3}}, r"power of joint \d is 0\.1 "),
+    "far": ({"power_limit": 0.1, "at_least": {"distance": 0.3}}, r"power of joint \d is 0\.1 "),
 }
 
 
@@ -177,8 +181,96 @@ HOPELESS = {
 )
 def test_where_no_start_keeps_the_limits_the_search_ends_soon_and_says_what_is_missed(case):
     (changes, words), tried = HOPELESS[case], []
-    found = solve(USUAL.with_(guess=None, **changes), progress=lambda news: tried.append(news.done))
+    stated = USUAL.with_(guess=None, delta=1e-2, **changes)
+    found = solve(stated, progress=lambda news: tried.append(news.done))
     assert max(tried) == OPTIONS.patience
     assert found.status == "not converged"
     assert re.search(f"the limit on the {words}.* allow the joints more", found.message)
     assert "None of 8 starts led to a gait of the class that keeps the limits" in found.message
+
+
+CHAIN = Chain((0.3, 0.25, 0.45))
+FLOOR = Friction(mu_t=1.3, mu_f=0.7, mu_b=1.1)
+GAIT = Fourier([0.3, -0.2], cos=[[0.6, 0.1], [0.3, 0.2]], sin=[[0.2, 0.3], [0.7, -0.1]])
+DELTA, FROUDE = 0.05, 0.3
+
+
+def states(n):
+    return np.random.default_rng(0).normal(size=(3, n))
+
+
+def test_torques_by_derivatives_agree_with_those_by_differences_in_time():
+    t, h = np.linspace(0.03, 0.9, 7), 1e-4
+    (angles, rates), accelerations = GAIT(t), (GAIT(t + h)[1] - GAIT(t - h)[1]) / (2 * h)
+    momenta = states(t.size)
+    function = torque_function(CHAIN, FLOOR)
+    found = function(angles, rates, accelerations, momenta, DELTA, FROUDE).full()
+    wanted = joint_torques(CHAIN, FLOOR, GAIT, t, momenta, delta=DELTA, froude=FROUDE)
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+def test_a_uniform_pull_takes_no_torque():
+    """What it does to the joints of a body at rest, less what its acceleration of all links does."""
+    angles, pull = GAIT(np.linspace(0.03, 0.9, 7))[0], np.random.default_rng(1).normal(size=(2, 7))
+    none = np.zeros((len(CHAIN.contact.force_names), 7))
+    falls = (pull[0] * c + pull[1] * s for c, s in zip(*directions(angles), strict=True))
+    aside = (pull[1] * c - pull[0] * s for c, s in zip(*directions(angles), strict=True))
+    growth = LinkVelocity(np.array([*falls]), np.array([*aside]), np.zeros((3, 7)))
+    still = LinkVelocity(*np.zeros((3, 3, 7)))
+    against = joint_moments(CHAIN, angles, none, pull)
+    np.testing.assert_allclose(
+        against + inertial_moments(CHAIN, angles, still, growth), 0.0, atol=1e-14
+    )
+
+
+def directions(angles):
+    """Cosines and sines of the links' directions from that of the tail link."""
+    turns = np.cumsum(np.vstack([np.zeros(angles.shape[1]), angles]), axis=0)
+    return np.cos(turns), np.sin(turns)
+
+
+def test_joints_do_the_work_of_friction_and_what_the_kinetic_energy_grows_by():
+    """Power balance, whatever the momenta: M . r = dissipation + Fr dT/dt."""
+    t, momenta, h = np.linspace(0.03, 0.9, 7), states(7), 1e-5
+    angles, rates = GAIT(t)
+    at = {"delta": DELTA, "froude": FROUDE}
+    now = momentum_rates(CHAIN, FLOOR, angles, rates, momenta, **at)
+
+    def energy(by):
+        (q, r), then = GAIT(t + by), momenta + by * now.rates
+        return kinetic_energy(CHAIN, q, r, tail_velocity(CHAIN, q, r, then))[0]
+
+    growth = (energy(h) - energy(-h)) / (2 * h)
+    torques = joint_torques(CHAIN, FLOOR, GAIT, t, momenta, **at)
+    np.testing.assert_allclose(
+        (torques * rates).sum(axis=0), now.power[0] + FROUDE * growth, atol=1e-6
+    )
+
+
+def limited(**changes):
+    stated = {"body": CHAIN, "gait": Harmonic(2), "delta": 1e-2, "intervals": 20}
+    return Problem(
+        "limited", friction=FLOOR, **({"torque_limit": 0.05, "froude": 0.2} | stated | changes)
+    )
+
+
+def test_a_gait_whose_motors_limit_it_is_certified_and_uses_all_that_it_may():
+    stated = {"friction": Friction(mu_t=2, mu_f=1, mu_b=1), "gait": Harmonic(1, "antipodal")}
+    problem = Problem("weak", delta=1e-2, froude=0.2, torque_limit=0.2, **stated)
+    strong = solve(problem.with_(torque_limit=None), starts=1)
+    weak = solve(problem, starts=1)
+    assert weak.status == "solved", weak.message
+    assert weak.answer.program == "full"
+    assert weak.value < strong.value - 1e-4
+    (check,) = (check for check in weak.certificate.checks if check.name == "actuators")
+    assert check.passed
+    most = [np.abs(sheet_torques(each, np.arange(2000) / 2000)).max() for each in (strong, weak)]
+    assert most[0] > 0.21
+    assert most[1] == pytest.approx(0.2, rel=1e-3)
+    (used,) = lines(weak)  # statics say nothing of what accelerates links
+    assert "torque 100 % of 0.2" in used
+    again = evaluate(problem, weak.gait)
+    assert again.status == "solved", again.message
+    assert again.value == pytest.approx(weak.value, rel=1e-5)
+    beyond = evaluate(problem, strong.gait)
+    assert [check.name for check in beyond.certificate.failures] == ["actuators"]

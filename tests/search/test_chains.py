@@ -71,12 +71,7 @@ def test_parallel_links_that_slip_through_each_other_are_caught():
 def curl(amplitude, **changes):
     """Five links that curl up as a whole; they close a ring at 2 pi / 5 a joint."""
     guess = Fourier(np.zeros(4), np.full((4, 1), amplitude), np.zeros((4, 1)))
-    fields = {
-        "body": Chain((0.2,) * 5),
-        "gait": Harmonic(1, "antipodal"),
-        "intervals": 12,
-        "mesh_tolerance": 0.0,
-    }
+    fields = {"body": Chain((0.2,) * 5), "gait": Harmonic(1, "antipodal"), "intervals": 12}
     return Problem("curl", guess, **(fields | changes))
 
 
@@ -127,10 +122,8 @@ def test_scallop_theorem(lengths, friction):
         return 0.3 + 1.5 * np.sin(2 * np.pi * t)[None], 3 * np.pi * np.cos(2 * np.pi * t)[None]
 
     def uneven(t):
-        phase, rate = (
-            2 * np.pi * t + 0.6 * np.sin(2 * np.pi * t),
-            2 * np.pi * (1 + 0.6 * np.cos(2 * np.pi * t)),
-        )
+        phase = 2 * np.pi * t + 0.6 * np.sin(2 * np.pi * t)
+        rate = 2 * np.pi * (1 + 0.6 * np.cos(2 * np.pi * t))
         return 0.3 + 1.5 * np.sin(phase)[None], 1.5 * (np.cos(phase) * rate)[None]
 
     for delta in (1e-1, 1e-4):
@@ -152,11 +145,8 @@ def test_two_links_cannot_gain_by_any_delta_or_harmonics_what_directional_fricti
     assert solution.status == "solved"
 
     def efficiency(amplitude):
-        gait = Fourier([0.0], [[amplitude]], [[0.0]])
-        body, friction = solution.problem.body, solution.problem.friction
-        return replay(
-            body, friction, lambda t: (gait.angles(t), gait.rates(t)), 1e-4, tolerance=1e-5
-        ).efficiency
+        at = solution.problem.body, solution.problem.friction
+        return replay(*at, Fourier([0.0], [[amplitude]], [[0.0]]), 1e-4, tolerance=1e-5).efficiency
 
     sweep = np.linspace(0.8, 2.4, 9)
     values = [efficiency(a) for a in sweep]

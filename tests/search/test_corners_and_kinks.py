@@ -1,26 +1,21 @@
-"""Optima at the corner of the contact region, and meshes whose knots sit on kinks: random starts
-that used to fail."""
+"""Optima at the corner of the contact region, meshes whose knots sit on kinks, and polygons at the
+fold: certified."""
 
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, NotConvergedError, Problem, ellipse
+from colloc import Chain, Corners, Friction, Harmonic, NotConvergedError, Polygon, Problem, ellipse
 from colloc.gaits.starts import latin_hypercube_gait
+from colloc.results.solution import SOLVED
 from colloc.search.iterate import evaluate_at, space_near
 from colloc.search.optimise import refine
 from colloc.search.solve import solve
+from research.small_gaits import small_gait
 
 
 def from_start(start, friction, symmetry, **fields):
-    problem = Problem(
-        "case",
-        ellipse(0.0, 1.0, 0.5),
-        friction=friction,
-        gait=Harmonic(1, symmetry),
-        delta=1e-4,
-        delta_start=0.1,
-        **fields,
-    )
+    stated = {"gait": Harmonic(1, symmetry), "delta": 1e-4, "delta_start": 0.1} | fields
+    problem = Problem("case", ellipse(0.0, 1.0, 0.5), friction=friction, **stated)
     return problem.with_(guess=latin_hypercube_gait(problem, 0, start))
 
 
@@ -49,13 +44,8 @@ def test_refinement_encloses_a_kink_instead_of_following_it():
 
 def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
     """Nearest to it, no gradient is below 1e-3; those of both sides cancel."""
-    problem = Problem(
-        "kink",
-        body=Chain((0.2, 0.5, 0.3)),
-        friction=Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0),
-        gait=Harmonic(3, "none"),
-        delta=1e-4,
-    )
+    body, friction = Chain((0.2, 0.5, 0.3)), Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0)
+    problem = Problem("kink", None, body, friction, Harmonic(3), delta=1e-4)
     solution = solve(problem.with_(guess=latin_hypercube_gait(problem, 0, 3)), 1)
     assert solution.status == "solved", solution.message
     assert "kink" in solution.message
@@ -73,3 +63,41 @@ def test_a_gait_whose_finer_mesh_has_no_balance_is_kept_and_says_so(monkeypatch)
     kept = refine(found)
     np.testing.assert_array_equal(kept.v, found.v)
     assert kept.message == "refinement ended, as on a finer mesh: the balance did not converge."
+
+
+def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():
+    corners = np.array([[3.1416, 3.13, 3.13, 3.05], [-0.15, 0.0, 0.12, 0.12]])
+    corners[0] = np.minimum(corners[0], np.pi)
+    problem = Problem("fold", Corners(corners), gait=Polygon(4), intervals=24, delta_start=1e-3)
+    solution = solve(problem, 1)
+    assert solution.status == "solved"
+    assert solution.certificate.efficiency > 0.44
+    assert np.abs(solution.gait.corners).max() == pytest.approx(np.pi, abs=1e-6)
+    assert solution.gait.length == pytest.approx(2 * np.pi * problem.smallest_shape_speed, rel=1e-6)
+
+
+def test_ipopt_alone_refines_the_mesh_of_a_polygon_just_until_the_replay_is_as_near_as_asked():
+    """Delta is relative to the shape speed: with another one a mesh that will do is refined."""
+    coarsely = {"delta": 0.02, "intervals": 8, "scheme": "gauss-1"}
+    stated = Problem("path", ellipse(1.0, 0.7, 1.1), gait=Polygon(4, "bilateral"), **coarsely)
+    for tolerance, meshes in ((1e-3, 1), (1e-4, 2)):
+        found = solve(stated.with_(mesh_tolerance=tolerance), search="full")
+        (error,) = [check for check in found.certificate.checks if check.name == "mesh error"]
+        assert error.passed
+        assert len(found.history) == meshes
+
+
+@pytest.mark.slow
+def test_triangles_at_the_fold_approach_the_best_infinitesimal_gait_in_proportion_to_their_length():
+    limit = small_gait(Chain(), Friction(), np.array([np.pi, 0.0])).efficiency
+    shortfalls = []
+    for speed in (0.1, 0.04):
+        shape, length = np.array([3.0, -0.03]), 2 * np.pi * speed
+        guess = Corners(small_gait(Chain(), Friction(), shape).path(shape, 1.1 * length))
+        small = {"smallest_shape_speed": speed, "delta": 1e-3 * speed, "delta_start": 0.1 * speed}
+        solution = solve(Problem("small", guess, gait=Polygon(3), intervals=30, **small), 1)
+        assert solution.status == SOLVED
+        assert solution.gait.length == pytest.approx(length, rel=1e-3)
+        shortfalls.append((limit - solution.certificate.efficiency) / length)
+    assert 0.4560 < limit < 0.4563
+    assert shortfalls[1] == pytest.approx(shortfalls[0], rel=0.15)

@@ -43,10 +43,7 @@ def played(gait, feet, delta, count=300):
     """Distance over work of three equal links of equal friction by a program of its own: feet as
     complex numbers in the frame of the tail, the balance by SciPy, the path by the midpoint
     rule."""
-    angles, rates = (
-        gait.angles((np.arange(count) + 0.5) / count),
-        gait.rates((np.arange(count) + 0.5) / count),
-    )
+    angles, rates = gait((np.arange(count) + 0.5) / count)
     places = (np.arange(feet) + 0.5) / feet
     z, heading, way, work = np.zeros(3), 0.0, 0.0, 0.0
     for q, r in zip(angles.T, rates.T, strict=True):
@@ -81,19 +78,16 @@ def played(gait, feet, delta, count=300):
 
 @pytest.mark.parametrize(("gait", "feet"), [(KNOWN, 1), (PAPER, 1), (PAPER, 2), (PAPER, 4)])
 def test_a_replay_is_that_of_a_program_of_its_own(gait, feet):
-    assert replay(Chain(feet=feet), Friction(), gait, 1e-1).efficiency == pytest.approx(
-        played(gait, feet, 1e-1), rel=2e-3
-    )
+    found = replay(Chain(feet=feet), Friction(), gait, 1e-1)
+    assert found.efficiency == pytest.approx(played(gait, feet, 1e-1), rel=2e-3)
 
 
 def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():
     """Wheels alone: the problem's friction acts nowhere. The search sees it in units of its own
     size."""
     wheels = Chain(feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(3)))
-    one, other = (
-        Problem("wheels", body=wheels, friction=own)
-        for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9))
-    )
+    laws = Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9)
+    one, other = (Problem("wheels", body=wheels, friction=own) for own in laws)
     assert one.law == other.law
     scaled = control_problem(other)
     law = scaled.dynamics.law
@@ -101,10 +95,7 @@ def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says(
     assert 0.1 < law.smallest < 10
     assert Problem.from_dict(other.with_(friction=law).to_dict()).law == law
     angles, rates = random_instants(20)
-    z, same, again = (
-        solve_balance(wheels, own, angles, rates, 1e-3).z
-        for own in (Friction(), Elliptic(mu_t=7, mu_f=8, mu_b=9), law)
-    )
+    z, same, again = (solve_balance(wheels, own, angles, rates, 1e-3).z for own in (*laws, law))
     np.testing.assert_array_equal(z, same)
     np.testing.assert_allclose(z, again, atol=1e-9)
     stated, resolved = (
@@ -145,12 +136,11 @@ def test_a_gait_of_no_size_pays_no_more_than_the_least_friction_on_one_foot_a_li
 
 
 def test_what_feet_cannot_do_yet_is_refused():
+    body, friction = Chain(feet=1), Friction(mu_t=2, mu_f=1, mu_b=1)
     with pytest.raises(ProblemError, match="on feet no upper bound"):
-        Domain(Chain(feet=1), Friction(mu_t=2, mu_f=1, mu_b=1), 2.0)
-    assert "on feet no upper bound" in refusal(
-        Problem("bound", body=Chain(feet=1), friction=Friction(mu_t=2, mu_f=1, mu_b=1))
-    )
-    assert refusal(Problem("bound", body=Chain(feet=1))) == ""
+        Domain(body, friction, 2.0)
+    assert "on feet no upper bound" in refusal(Problem("bound", None, body, friction))
+    assert refusal(Problem("bound", None, body)) == ""
 
 
 def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, three_link):

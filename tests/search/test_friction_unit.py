@@ -13,13 +13,9 @@ from tests.shared.laws import coulomb
 
 
 def stated(*mu, **changes):
-    settings = {
-        "gait": Harmonic(1, "bilateral"),
-        "intervals": 24,
-        "delta": 1e-2,
-        "mesh_tolerance": 1e-4,
-    } | changes
-    return Problem("unit", ellipse(0.3, 1.0, 0.5), friction=coulomb(*mu), **settings)
+    coarsely = {"intervals": 24, "delta": 1e-2, "mesh_tolerance": 1e-4}
+    usual = {"gait": Harmonic(1, "bilateral"), "friction": coulomb(*mu), **coarsely}
+    return Problem("unit", ellipse(0.3, 1.0, 0.5), **usual | changes)
 
 
 def test_every_limit_follows_friction_by_its_own_power():
@@ -56,11 +52,8 @@ def test_coefficients_of_any_size_are_solved_and_certified(usual, size):
 
 
 def test_what_must_be_reached_is_stated_in_units_of_friction_too():
-    light = Problem(
-        "light",
-        friction=Friction(1e-3, 1e-3, 1e-3),
-        at_least={"efficiency": 150.0, "distance": 0.2},
-    )
+    least = {"efficiency": 150.0, "distance": 0.2}
+    light = Problem("light", friction=Friction(1e-3, 1e-3, 1e-3), at_least=least)
     scaled = control_problem(light)
     assert (scaled.unit, scaled.dynamics.law.mu_t) == (1e-3, 1.0)
     assert [value for _, value in scaled.aims.at_least] == pytest.approx([0.15, 0.2])

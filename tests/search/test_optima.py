@@ -40,10 +40,7 @@ def swept_maximum(centre, width, n=240):
     centre = np.array(centre)
     while width > 2e-3:
         axis = np.linspace(-width, width, 7)
-        grid = (
-            np.stack([a.ravel() for a in np.meshgrid(axis, axis, axis, indexing="ij")], axis=1)
-            + centre
-        )
+        grid = centre + np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
         # the joint limit is a curved edge of the admissible set: add points on it
         direction = grid[:, 1:] / np.hypot(grid[:, 1], grid[:, 2])[:, None]
         on_edge = np.column_stack([grid[:, 0], direction * (np.pi - np.abs(grid[:, 0]))[:, None]])
@@ -68,10 +65,8 @@ def test_collocation_finds_the_maximum_of_a_grid_sweep(name, around, width, solv
     assert solution.status == "solved"
     value, point = swept_maximum(around, width)
     assert abs(solution.certificate.efficiency / value - 1) < 1e-4
-    gait = solution.gait
-    np.testing.assert_allclose(
-        [abs(gait.mean[0]), gait.cos[0, 0], gait.sin[0, 0]], np.abs(point), atol=0.02
-    )
+    found = abs(solution.gait.mean[0]), solution.gait.cos[0, 0], solution.gait.sin[0, 0]
+    np.testing.assert_allclose(found, np.abs(point), atol=0.02)
     assert abs(solution.certificate.efficiency - reference.efficiency) < reference.tolerance
 
 
@@ -79,13 +74,11 @@ def test_with_slow_joints_it_is_the_maximum_over_ellipses_that_are_small_enough(
     """Joints of one harmonic of amplitude a are at most 2 pi a fast: all that is swept is (A0, a,
     B1 / A1)."""
     speed = 12.0
-    solution = solve(Problem("slow", gait=Harmonic(1, "bilateral"), speed_limit=speed))
+    solution = solve(Problem("slow", gait=Harmonic(1, "bilateral"), speed_limit=speed), 4)
     centre, width = np.array([0.0, 0.8, 0.8]), np.array([1.5, 0.2, 0.7])
     while width[0] > 0.01:
         steps = np.linspace(-1, 1, 7)
-        grid = centre + width * np.stack(
-            [a.ravel() for a in np.meshgrid(steps, steps, steps)], axis=1
-        )
+        grid = centre + width * np.stack(np.meshgrid(*[steps] * 3), axis=-1).reshape(-1, 3)
         grid[:, 1] = np.minimum(grid[:, 1], 1.0)
         a, turn = grid[:, 1] * speed / (2 * np.pi), grid[:, 2]
         ellipses = np.column_stack([grid[:, 0], a * np.cos(turn), a * np.sin(turn)])
@@ -93,6 +86,5 @@ def test_with_slow_joints_it_is_the_maximum_over_ellipses_that_are_small_enough(
         best = int(np.argmax(value))
         centre, width = grid[best], 0.5 * width
     assert centre[1] == 1.0
-    assert solution.certificate.efficiency == pytest.approx(
-        efficiencies(ellipses[[best]], 960)[0], rel=1e-4
-    )
+    value = efficiencies(ellipses[[best]], 960)[0]
+    assert solution.certificate.efficiency == pytest.approx(value, rel=1e-4)

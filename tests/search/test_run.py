@@ -1,7 +1,8 @@
 """What a run keeps: everything between stages, exactly; so an interrupted solve ends as if nothing
-had happened."""
+had happened, and what other processes compute ahead changes nothing."""
 
 import functools
+import os
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,10 +22,11 @@ from colloc import BSpline, Chain, Friction, Harmonic, ModalBody, Polygon, Probl
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import is_visible, on_speed_floor
 from colloc.results.store import load
+from colloc.search import checkpoint as ahead
 from colloc.search.certify import certify
-from colloc.search.checkpoint import ROWS, STAGES, Run
+from colloc.search.checkpoint import ROWS, STAGES, Ahead, Run
 from colloc.search.confirm import confirm
-from colloc.search.explore import explore, first_optimum
+from colloc.search.explore import explore, first_optimum, sketch
 from colloc.search.optimise import descend, project_to_zero_rotation, refine
 from colloc.search.options import SearchOptions
 from colloc.search.solve import certify_answer, choose, solve
@@ -133,18 +136,6 @@ def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path
         assert computed.count(stage) == rows.count(stage) > 0
 
 
-def test_ctrl_c_in_python_gives_a_solution_and_is_over_then():
-    def press(news):
-        if news.stage == "explore" and news.done == 1:
-            signal.raise_signal(signal.SIGINT)
-
-    found = solve(QUICK, 4, progress=press)
-    assert found.status == "interrupted"
-    assert found.message.startswith("interrupted; this is the best gait so far.")
-    assert found.value > 0
-    assert solve(QUICK, 1).status != "interrupted"
-
-
 def test_every_stage_makes_the_value_of_the_next_one_and_together_they_are_a_solve():
     solution = solve(QUICK, 2)
     optimum = refine(descend(explore(QUICK, 2).optima[0]))
@@ -162,18 +153,16 @@ def test_every_stage_makes_the_value_of_the_next_one_and_together_they_are_a_sol
 def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_be(shrinking):
     found = solve(QUICK.with_(delta=1e-3, mesh_tolerance=1e-5), 1)
     assert found.success
-    big = found
-    tiny = found.gait.scaled(0.01)
-    answer = replace(found.answer, gait=tiny, value=1.1 * found.answer.value)
-    small = replace(found, answer=answer)
-    assert is_visible(big.gait)
+    tiny = {"gait": found.gait.scaled(0.01), "value": 1.1 * found.answer.value}
+    small = replace(found, answer=replace(found.answer, **tiny))
+    assert is_visible(found.gait)
     assert not is_visible(small.gait)
-    chosen = choose(found.problem.with_(shrinking=shrinking), [small, big])
+    chosen = choose(found.problem.with_(shrinking=shrinking), [small, found])
     if shrinking:
         assert chosen.answer is small.answer
         assert chosen.shrunk is None
     else:
-        assert chosen.answer is big.answer
+        assert chosen.answer is found.answer
         assert chosen.shrunk.answer is small.answer
         assert "Smaller gaits do better still" in chosen.message
     assert choose(found.problem, [small]).answer is small.answer
@@ -196,27 +185,18 @@ def test_a_kept_value_that_was_damaged_is_found_anew(tmp_path):
         assert again.n_reused == 0
 
 
-def problems():
-    yield QUICK
-    yield Problem("series", series(), Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1), **AT)
-    yield Problem("spline", ellipse(1.0, 0.7, 1.1), gait=BSpline(8, symmetry="bilateral"), **AT)
-    yield Problem(
-        "sides", ellipse(1.0, 0.7, 1.1), gait=Polygon(4, "bilateral"), **{**AT, "intervals": 24}
-    )
-    yield Problem(
-        "uphill",
-        ellipse(0, 2.8, 1.3),
-        gait=Harmonic(1, "bilateral"),
-        grade=0.1,
-        **{**AT, "delta_start": None},
-    )
-    yield Problem(
-        "modes", body=ModalBody(2, panels=4), gait=Harmonic(1, "antipodal"), **{**AT, "delta": 0.1}
-    )
-
-
-def series():
-    return colloc.Fourier([0.2, 0.0, -0.1], [[1.0], [0.2], [-0.8]], [[0.3], [1.1], [0.5]])
+SERIES = colloc.Fourier([0.2, 0.0, -0.1], [[1.0], [0.2], [-0.8]], [[0.3], [1.1], [0.5]])
+WIDE = ellipse(1.0, 0.7, 1.1)
+PROBLEMS = [
+    QUICK,
+    Problem("series", SERIES, Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1), **AT),
+    Problem("spline", WIDE, gait=BSpline(8, symmetry="bilateral"), **AT),
+    Problem("sides", WIDE, gait=Polygon(4, "bilateral"), **AT | {"intervals": 24}),
+    QUICK.with_(name="uphill", guess=ellipse(0, 2.8, 1.3), grade=0.1, delta_start=None),
+    Problem(
+        "modes", None, ModalBody(2, panels=4), gait=Harmonic(1, "antipodal"), **AT | {"delta": 0.1}
+    ),
+]
 
 
 @pytest.fixture
@@ -225,7 +205,7 @@ def at_once(monkeypatch):
     monkeypatch.setattr("colloc.search.checkpoint.OPTIONS", SearchOptions(checkpoint_interval=0.0))
 
 
-@pytest.mark.parametrize("problem", list(problems()), ids=lambda problem: problem.name)
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
 def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tmp_path, at_once):
     path = tmp_path / "x.run.sqlite"
     first = Run(path, problem)
@@ -236,11 +216,8 @@ def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tm
         again = descend(first_optimum(problem, problem.guess))
     assert second.n_reused == len(read_rows(path, ROWS)) - 1 > 0
     np.testing.assert_array_equal(again.v, found.v)
-    assert (again.objective, again.kkt_error, again.history) == (
-        found.objective,
-        found.kkt_error,
-        found.history,
-    )
+    for name in ("objective", "kkt_error", "history"):
+        assert getattr(again, name) == getattr(found, name)
     # its space is made anew, and its program says the same
     assert again.program().objective(again.v) == found.program().objective(found.v)
     np.testing.assert_array_equal(again.program().rows(again.v), found.program().rows(found.v))
@@ -248,11 +225,7 @@ def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tm
 
 @pytest.mark.slow
 def test_solves_on_two_threads_end_as_one_after_another():
-    friction = Friction(mu_t=2, mu_f=1, mu_b=1)
-    kinds = [
-        Problem("a", gait=Harmonic(2), **AT),
-        Problem("b", gait=Harmonic(2), friction=friction, **AT),
-    ]
+    kinds = [Problem("a", gait=Harmonic(2), friction=Friction(mu_t=mu), **AT) for mu in (1.0, 2.0)]
     with ThreadPoolExecutor(2) as threads:
         together = list(threads.map(colloc.solve, kinds))
     for problem, found in zip(kinds, together, strict=True):
@@ -269,15 +242,8 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
     (tmp_path / "quick.py").write_text(FILE.replace("delta=1e-3", "delta=0.1"), encoding="utf-8")
     run = run_file(tmp_path / "quick.h5")
     put_rows(run, ROWS, {"problem": "another"})
-    command = [
-        str(tmp_path / "quick.py"),
-        "--output",
-        f"{tmp_path}/",
-        "--no-figure",
-        "--starts",
-        "1",
-        "--quiet",
-    ]
+    words = f"--output {tmp_path}/ --no-figure --starts 1 --quiet"
+    command = [str(tmp_path / "quick.py"), *words.split()]
     assert main(command) == 2
     assert "--fresh begins again" in capsys.readouterr().err
     run.write_bytes(b"not SQLite" * 100)
@@ -307,18 +273,16 @@ def test_a_run_that_cannot_be_written_is_told_once_and_is_written_at_the_end_if_
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits")
-@pytest.mark.parametrize("held", [3])
 def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_there(
-    undisturbed, tmp_path, held
+    undisturbed, tmp_path
 ):
     """No file may grow, which a write meets as it meets a full disk."""
     import resource
 
     file, wanted = undisturbed
-    run, rows = run_file(tmp_path / "quick.h5"), {f"stage {k}": [k] for k in range(held)}
-    if held:
-        put_rows(run, ROWS, {"problem": read_problem_file(file).problem.hash, **rows})
-    before = run.read_bytes() if held else b""
+    run, rows = run_file(tmp_path / "quick.h5"), {f"stage {k}": [k] for k in range(3)}
+    put_rows(run, ROWS, {"problem": read_problem_file(file).problem.hash, **rows})
+    before = run.read_bytes()
     command = [word for word in solve_command(file, tmp_path) if word != "--quiet"]
 
     def full():
@@ -334,9 +298,7 @@ def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_the
     ):
         assert done.stderr.count(said) == 1
     assert "Traceback" not in done.stderr
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == (
-        {run.name: before} if held else {}
-    )
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {run.name: before}
     subprocess.run(command, capture_output=True, check=True)  # with room
     assert contents(tmp_path / "quick.h5") == wanted
 
@@ -367,13 +329,8 @@ def test_time_that_is_over_gives_the_best_gait_so_far(thread):
 def test_the_best_gait_told_of_is_one_of_finite_size_and_stages_come_in_their_order():
     """Here small loops are better from the first start on, and one of the gaits that lead the
     sketches shrinks on its way."""
-    problem = Problem(
-        "three",
-        body=Chain((0.4, 0.2, 0.4)),
-        friction=Friction(mu_t=2, mu_f=1, mu_b=1.4),
-        gait=Harmonic(1),
-        delta=1e-3,
-    )
+    body, friction = Chain((0.4, 0.2, 0.4)), Friction(mu_t=2, mu_f=1, mu_b=1.4)
+    problem = Problem("three", None, body, friction, Harmonic(1), delta=1e-3)
     seen = []
     solution = solve(problem, 2, progress=seen.append)
     assert solution.shrunk.value > 1.1 * solution.value
@@ -392,7 +349,7 @@ def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess(
     def stopping(news):
         seen.append(news.best)
         if len(seen) == 2:
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
 
     first, best = solve(QUICK, seconds=1e-9), solve(QUICK, 2, progress=stopping)
     assert (first.status, best.status) == ("interrupted",) * 2
@@ -400,9 +357,99 @@ def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess(
         first.gait.angles(np.arange(9) / 9), QUICK.guess.angles(np.arange(9) / 9), atol=1e-12
     )
     assert best.value == seen[-1].value > 1.5 * first.value
+    assert best.message.startswith("interrupted; this is the best gait so far.")
+    assert solve(QUICK, 1).status != "interrupted"  # it is over then
 
 
 def test_a_stage_refuses_arguments_by_name_which_its_digest_would_miss():
     gait = QUICK.guess
     with pytest.raises(TypeError, match="by place"):
         project_to_zero_rotation(QUICK, gait, delta=0.1)
+
+
+PROBLEM = Problem("quick", gait=Harmonic(1, "none"), **AT)
+
+
+@pytest.fixture
+def received(monkeypatch):
+    """Processes begin at once; of each task of theirs, the number of rows and the run."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    monkeypatch.setattr(ahead, "OPTIONS", SearchOptions(worth_a_process=0.0))
+    update, numbers = Run.update, []
+
+    def counted(run, rows):
+        numbers.append((len(rows), run))
+        update(run, rows)
+
+    monkeypatch.setattr(Run, "update", counted)
+    return numbers
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    path = tmp_path_factory.mktemp("alone") / "quick.h5"
+    assert colloc.solve(PROBLEM, starts=8, output=path).status == "solved"
+    return contents(path)
+
+
+def test_the_file_is_the_same_to_the_last_bit(alone, received, tmp_path, monkeypatch):
+    wait_for = Ahead.wait_for
+
+    def patient(self, *task):
+        until = time.monotonic() + 60.0
+        while not all(f.done() for f in self._futures.values()) and time.monotonic() < until:
+            time.sleep(0.01)
+        wait_for(self, *task)
+
+    monkeypatch.setattr(Ahead, "wait_for", patient)
+    colloc.solve(PROBLEM, starts=8, output=tmp_path / "quick.h5")
+    assert sum(n_rows > 0 for n_rows, _ in received) > 1
+    assert received[0][1].n_reused > 0.5 * sum(n_rows for n_rows, _ in received)
+    assert contents(tmp_path / "quick.h5") == alone
+
+
+def _die(problem, task):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_so_it_is_if_they_die(alone, received, tmp_path, monkeypatch):
+    monkeypatch.setattr(ahead, "_rows_of", _die)
+    colloc.solve(PROBLEM, starts=8, output=tmp_path / "quick.h5")
+    assert not received
+    assert contents(tmp_path / "quick.h5") == alone
+
+
+def test_none_is_begun_for_what_this_process_alone_knows_nor_for_little(received, monkeypatch):
+    run = Run(problem=PROBLEM)
+    run.problem = SimpleNamespace(law=lambda: 0)
+    run.ahead.begin(1e3)
+    assert run.ahead.count == 0
+    monkeypatch.setattr(ahead, "OPTIONS", SearchOptions(worth_a_process=2.0))
+    some = Run(problem=PROBLEM).ahead
+    some.begin(1.9)
+    assert some.count == 0
+    some.begin(2.1)
+    assert some.count == 2
+    some.end()
+
+
+def test_none_is_begun_where_a_stage_is_called_by_itself(received):
+    assert explore(PROBLEM, starts=4).starts >= 4
+    assert not received
+
+
+def test_files_of_the_folder_are_not_run(received, tmp_path, monkeypatch):
+    (tmp_path / "random.py").write_text("open('ran', 'w').close()", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    some = Run(problem=PROBLEM).ahead
+    some.begin(1e3)
+    for _ in range(2):  # what is asked for twice is computed once
+        some.submit(1, sketch, PROBLEM, PROBLEM.guess, True, [0.1, 0.01])
+    (future,) = some._futures.values()
+    future.result(timeout=60)
+    for _ in range(2):
+        some.wait_for(sketch, PROBLEM, PROBLEM.guess, True, [0.1, 0.01])
+    some.end()
+    assert len(received) == 1
+    assert received[0][0] > 0
+    assert not (tmp_path / "ran").exists()

@@ -28,17 +28,12 @@ def test_as_much_more_friction_all_round_costs_as_much(three_link, found):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "others"),
-    [
-        ("three_link_feet", ()),
-        ("three_link_fast", ("Froude number",)),
-        ("three_link_uphill", ("grade",)),
-    ],
+    ("name", "other"), [("feet", ()), ("fast", ("Froude number",)), ("uphill", ("grade",))]
 )
-def test_so_it_is_on_feet_and_where_gravity_and_inertia_are_as_much_stronger(name, others, solved):
-    solution = solved(name)[0]
+def test_so_it_is_on_feet_and_where_gravity_and_inertia_are_as_much_stronger(name, other, solved):
+    solution = solved(f"three_link_{name}")[0]
     found = solution.sensitivity()
-    total = sum(found[each].slope for each in (*(f"friction {way}" for way in WAYS), *others))
+    total = sum(found[each].slope for each in (*(f"friction {way}" for way in WAYS), *other))
     assert total == pytest.approx(-solution.value, rel=1e-4)
 
 
@@ -51,9 +46,8 @@ def test_a_longer_middle_is_shorter_ends(found):
 
 def test_only_what_holds_the_gait_back_has_a_price(found, three_link):
     assert found["smallest shape speed"].slope == 0
-    assert np.abs(three_link.gait.angles(np.linspace(0, 1, 2001))).max() == pytest.approx(
-        np.pi, abs=1e-4
-    )
+    largest = np.abs(three_link.gait.angles(np.linspace(0, 1, 2001))).max()
+    assert largest == pytest.approx(np.pi, abs=1e-4)
     assert found["joint limit"].slope > 10 * found["joint limit"].error
 
 
@@ -97,10 +91,8 @@ def test_slopes_on_a_finer_mesh_differ_by_no_more_than_the_errors(solved, of):
     """The gait on the mesh of an answer lies beside the true one, which moves slopes to first
     order."""
     rough = solved("three_link_offset")[0]
-    fine = colloc.solve(
-        rough.problem.with_(guess=rough.gait, delta_start=rough.problem.delta, mesh_tolerance=1e-8),
-        starts=1,
-    )
+    finely = {"delta_start": rough.problem.delta, "mesh_tolerance": 1e-8}
+    fine = colloc.solve(rough.problem.with_(guess=rough.gait, **finely), starts=1)
     of("friction sideways", "friction backwards")
     for effect, finer in zip(rough.sensitivity().effects, fine.sensitivity().effects, strict=True):
         assert abs(effect.slope - finer.slope) <= effect.error + finer.error, effect.name
@@ -112,9 +104,7 @@ def test_a_slope_that_changes_with_the_step_of_differences_is_off_by_no_more_tha
 ):
     """As where something else begins within a few steps: the derivative at the number itself is
     that of friction sideways."""
-    plain = next(
-        each for each in parameters(three_link.problem) if each.name == "friction sideways"
-    )
+    plain = {each.name: each for each in parameters(three_link.problem)}["friction sideways"]
     bent = replace(plain, name="bent", changed=lambda step: plain.changed(step + 1e8 * step**3))
     monkeypatch.setattr("colloc.search.sensitivity.parameters", lambda problem: [plain, bent])
     true, found = three_link.sensitivity().effects
@@ -132,15 +122,11 @@ def test_all_slopes_are_those_of_gaits_that_are_sought_again(problem, solved, of
     differences of 1 %, and is no part of their errors."""
     solution = solved(problem)[0]
     stated = solution.problem
-    finer = colloc.solve(
-        stated.with_(mesh_tolerance=0.1 * stated.mesh_tolerance, guess=solution.gait), 1
-    )
+    finely = {"mesh_tolerance": 0.1 * stated.mesh_tolerance}
+    finer = colloc.solve(stated.with_(guess=solution.gait, **finely), 1)
     # a limit that does not bind has the multiplier that IPOPT's barrier leaves, 1e-12
-    effects = [
-        each
-        for each in solution.sensitivity().effects
-        if abs(each.slope) > 1e-9 and each.name != "delta"
-    ]
+    effects = [each for each in solution.sensitivity().effects if abs(each.slope) > 1e-9]
+    effects = [each for each in effects if each.name != "delta"]
     for effect in effects:
         of(effect.name)
         slope, error = differences(finer, effect.name, 0.01)
@@ -161,16 +147,9 @@ def test_the_gait_on_file_falls_behind_to_second_order(three_link, of):
 def test_a_path_on_file_is_replayed_at_delta_at_unit_shape_speed(of):
     """Per period it is ten times that here."""
     of("friction sideways")
-    polygon = colloc.Problem(
-        "p",
-        colloc.ellipse(0, 0.8, 0.6),
-        gait=colloc.Polygon(3, "bilateral"),
-        delta=4e-4,
-        mesh_tolerance=1e-2,
-    )
-    found = sensitivity(colloc.solve(polygon, starts=1), resolve=True, change=1e-3)[
-        "friction sideways"
-    ].again
+    gait, at = colloc.Polygon(3, "bilateral"), {"delta": 4e-4, "mesh_tolerance": 1e-2}
+    polygon = colloc.solve(colloc.Problem("p", colloc.ellipse(0, 0.8, 0.6), gait=gait, **at), 1)
+    found = sensitivity(polygon, resolve=True, change=1e-3)["friction sideways"].again
     assert [each.kept for each in found] == pytest.approx([each.value for each in found], rel=1e-5)
 
 
@@ -182,10 +161,8 @@ def test_a_gait_that_exceeds_a_limit_or_turns_says_so(three_link, of):
 
 
 def test_feet_that_have_to_be_alike_move_together():
-    problem = colloc.Problem(
-        "x", body=colloc.Chain(feet=MIRRORED), gait=colloc.Harmonic(1, "bilateral")
-    )
-    stated = {each.name: each for each in parameters(problem)}
+    body, gait = colloc.Chain(feet=MIRRORED), colloc.Harmonic(1, "bilateral")
+    stated = {each.name: each for each in parameters(colloc.Problem("x", body=body, gait=gait))}
     assert "place of foot 2" not in stated  # the middle of the body
     moved = stated["place of feet 1 and 3"].changed(0.1).body.feet
     assert [foot.place for foot in moved] == pytest.approx([0.3, 0.5, 0.7])
@@ -206,11 +183,8 @@ def test_wheels_have_numbers_of_their_own(middle, others):
     own = [f"friction {way} of feet 1 and 3" for way in WAYS]
     assert {name for name in stated if "friction" in name} == {*others, *own}
     changed = [foot.friction for foot in stated[own[1]].changed(0.2).body.feet]
-    assert changed == [
-        colloc.Friction(mu_t=1, mu_f=0.06, mu_b=0.05),
-        body.feet[1].friction,
-        colloc.Friction(mu_t=1, mu_f=0.06, mu_b=0.05),
-    ]
+    outer = colloc.Friction(mu_t=1, mu_f=0.06, mu_b=0.05)
+    assert changed == [outer, body.feet[1].friction, outer]
 
 
 @pytest.mark.parametrize(
@@ -244,9 +218,8 @@ def test_every_number_can_change_and_nothing_else_does(changes):
         same, less = each.changed(0.0), each.changed(-0.01)
         assert same.with_(guess=problem.guess).hash == problem.hash, each.name
         now = {own.name: own.value for own in parameters(less)}[each.name]
-        assert now == pytest.approx(
-            0.99 * each.value if each.relative else each.value - 0.01, rel=1e-12
-        ), each.name
+        expected = 0.99 * each.value if each.relative else each.value - 0.01
+        assert now == pytest.approx(expected, rel=1e-12), each.name
 
 
 def test_what_is_no_optimum_is_refused(three_link, tmp_path):

@@ -1,5 +1,5 @@
-"""Crawlers with one travelling bump: the paper's is one of them, balance and slopes hold, and
-optimising helps."""
+"""Crawlers: the paper's and those that an optimiser may choose from; geometry, the bound, scalings
+with epsilon, and what holds the anchor."""
 
 import runpy
 
@@ -9,7 +9,6 @@ import pytest
 from colloc.commands.main import main as colloc_main
 from colloc.gaits.bspline import Corners, Polygon
 from colloc.gaits.problem import Problem
-from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
 from colloc.results.solution import Solution
@@ -21,20 +20,9 @@ from colloc.search.options import COARSE
 from colloc.search.solve import solve
 from colloc.smooth.crawler_body import LAP, CrawlerBody
 from colloc.smooth.prescribed_body import Concertina
-from colloc.system.errors import ProblemError
+from scripts.continue_epsilon import Crawler, delta_for, epsilon_point, fitted_order
 
 BODY = CrawlerBody(0.05, panels=16)
-
-
-def shapes(n, seed=5):
-    rng = np.random.default_rng(seed)
-    q = np.stack([rng.uniform(-LAP, LAP, n), *rng.normal(scale=0.4, size=(BODY.modes, n))])
-    return q, rng.normal(size=q.shape)
-
-
-def differences(function, at, h=1e-6):
-    unit = np.eye(len(at))[:, :, None]
-    return np.stack([(function(at + h * e) - function(at - h * e)) / (2 * h) for e in unit], axis=1)
 
 
 def test_the_paper_s_crawler_is_one_of_them():
@@ -49,34 +37,13 @@ def test_the_paper_s_crawler_is_one_of_them():
 
 
 def test_the_mirrored_half_is_the_negative_shape():
-    (q, _), s = shapes(4), np.linspace(0.44, 0.56, 60)[:, None]
+    rng, s = np.random.default_rng(5), np.linspace(0.44, 0.56, 60)[:, None]
+    q = np.stack([rng.uniform(-LAP, LAP, 4), *rng.normal(scale=0.4, size=(BODY.modes, 4))])
     np.testing.assert_allclose(BODY.tangent(s, -q), -BODY.tangent(s, q), atol=1e-13)
     assert np.abs(BODY.tangent(np.array([[0.1], [0.449], [0.551]]), q)).max() == 0.0
 
 
-def test_the_rate_of_the_angle_is_that_of_finite_differences():
-    (q, rates), s, h = shapes(4), np.linspace(0.44, 0.56, 25)[:, None], 1e-6
-    moved = (BODY.tangent(s, q + h * rates) - BODY.tangent(s, q - h * rates)) / (2 * h)
-    np.testing.assert_allclose(BODY.turning(s, q, rates), moved, atol=1e-6)
-
-
-def test_slopes_of_the_motion_are_those_of_finite_differences():
-    (q, rates), delta, n = shapes(3), 0.1, BODY.n_joint
-
-    def motion(y):
-        solved = BODY.solve(Friction(), y[:n], y[n:], delta, tolerance=1e-13)
-        now = BODY.motion(Friction(), y[:n], y[n:], delta, solved)
-        return np.concatenate([now.z, now.centre, now.power[None]])
-
-    numeric = differences(motion, np.concatenate([q, rates]))
-    _, slopes = motion_and_derivatives(
-        BODY, Friction(), q, rates, delta, BODY.solve(Friction(), q, rates, delta, tolerance=1e-13)
-    )
-    np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
-
-
 def test_optimising_beats_the_paper_s_crawler():
-    """On one coarse mesh and few panels, which are enough to tell them apart."""
     body = CrawlerBody(0.1, modes=2, panels=4)
     guess = Corners(body.concertina(1.499), "antipodal")
     space, v = space_near(
@@ -99,35 +66,21 @@ def test_the_problem_file_is_certified_beats_the_paper_s_crawler_and_is_kept(tmp
     np.testing.assert_array_equal(read.sample(0.3).tail, found.sample(0.3).tail)
 
 
-@pytest.mark.parametrize("changes", [{"epsilon": 0.7}, {"share": 0.0}, {"modes": 1}])
-def test_unusable_bodies_are_refused(changes):
-    with pytest.raises(ProblemError, match="must lie between"):
-        CrawlerBody(**({"epsilon": 0.1} | changes))
-
-
 def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     """The paper's crawler as it is, collocated but not searched nor certified."""
     body = CrawlerBody(epsilon=0.2, modes=2, panels=4)
     guess = Corners(body.concertina(1.2), "antipodal")
-    problem = Problem(
-        "paper",
-        guess,
-        body=body,
-        friction=Friction(),
-        gait=Polygon(8, "antipodal"),
-        delta=1e-3,
-        delta_start=1e-3,
-    )
-    solution = Solution(
-        problem, answer_of_iterate(evaluate_at(*space_near(problem, guess), problem.delta))
-    )
+    gait, at = Polygon(8, "antipodal"), {"delta": 1e-3, "delta_start": 1e-3}
+    problem = Problem("paper", guess, body=body, gait=gait, **at)
+    solution = Solution(problem, answer_of_iterate(evaluate_at(*space_near(problem, guess), 1e-3)))
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (
-        ("report", ()), ("export", ("--max-speed", "2")), ("animate", ("--seconds", "0.4", "--fps",
-        "5", "--periods", "1")),
-        ("verify", ("--compare", file)),
-    ):  # fmt: skip
-        assert colloc_main([command, file, *more]) == 0
+        ("report", ""),
+        ("export", "--max-speed 2"),
+        ("animate", "--seconds 0.4 --fps 5 --periods 1"),
+        ("verify", f"--compare {file}"),
+    ):
+        assert colloc_main([command, file, *more.split()]) == 0
     assert "bump coordinate" in (tmp_path / "paper.html").read_text()
     assert (tmp_path / "paper.csv").read_text().count("coordinate_3_rad") == 2
     assert "the same optimum" in capsys.readouterr().out
@@ -149,10 +102,85 @@ def test_a_bump_lies_at_the_ends_of_its_region_where_it_grows_and_is_flattened_a
     assert 0.4 < ends[0, 3] < ends[-1, 3] < 0.6
 
 
-@pytest.mark.parametrize(
-    "asked",
-    [{"way": (0.9,)}, {"way": (0.9, "text")}, {"way": 0.9}, {"sides": 3}, {"amplitude": "wide"}],
+SIDEWAYS = Crawler(
+    Concertina(epsilon=0.02, amplitude=1.2, share=0.3, bumps=2),
+    Friction(mu_t=1.0, mu_f=3.0, mu_b=3.0),
+    delta=1e-6,
 )
-def test_what_is_no_concertina_is_refused_in_one_sentence(asked):
-    with pytest.raises(ProblemError, match="must be"):
-        BODY.concertina(**{"amplitude": 1.3} | asked)
+ONE = Crawler(Concertina(epsilon=0.05, amplitude=1.3), delta=1e-6)
+
+
+def test_the_second_half_is_the_mirror_image():
+    s, t = np.linspace(0, 1, 301)[:, None] * np.ones((1, 3)), np.array([0.1, 0.25, 0.4])
+    motion = ONE.body.prescribed()
+    np.testing.assert_allclose(motion.angle(s, t + 0.5), -motion.angle(s, t), atol=1e-12)
+
+
+def test_two_bumps_are_antisymmetric_and_keep_their_length():
+    """Theta(1 - s) = -Theta(s), and the chord along the body never changes, in all stages."""
+    motion = SIDEWAYS.body.prescribed()
+    t = np.linspace(0.0, 0.999, 41)
+    s = np.linspace(0, 1, 20001)[:, None] * np.ones((1, t.size))
+    angle = motion.angle(s, t)
+    np.testing.assert_allclose(angle[::-1], -angle, atol=1e-9)
+    chord = np.trapezoid(np.cos(angle), s[:, 0], axis=0)
+    np.testing.assert_allclose(chord, chord[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("crawler", [ONE, SIDEWAYS])
+def test_the_anchor_holds_and_the_stroke_is_the_geometry(crawler):
+    """The distance is what the shape shortens or shifts, less a creep of order delta; nothing
+    rotates."""
+    p = crawler.period(intervals=2, quadrature_tolerance=1e-8)
+    assert p.d == pytest.approx(crawler.body.stroke, rel=2e-4)
+    assert p.d < crawler.body.stroke
+    assert p.nodes.slowest.max() < 30 * crawler.delta
+    assert abs(p.rotation) < 1e-12
+    assert p.efficiency < crawler.bound
+
+
+def test_isotropic_crawler_scales_as_the_paper_says():
+    """d ~ epsilon, W_inner ~ epsilon^2, W_outer/d -> 1, 1 - efficiency ~ epsilon; above 0.99 at
+    epsilon = 0.0025."""
+    epsilons = (0.01, 0.005, 0.0025)
+    periods = [
+        ONE.with_(epsilon=e, delta=delta_for(e)).period(intervals=1, quadrature_tolerance=1e-8)
+        for e in epsilons
+    ]
+    for found, order, off in (
+        ([p.d for p in periods], 1, 0.01),
+        ([p.W_inner for p in periods], 2, 0.02),
+        ([1 - p.efficiency for p in periods], 1, 0.05),
+    ):
+        assert fitted_order(epsilons, found) == pytest.approx(order, abs=off)
+    assert all(abs(p.W_outer / p.d - 1) < 2.2 * e for p, e in zip(periods, epsilons, strict=True))
+    assert 0.99 < periods[-1].efficiency < 1.0
+
+
+def test_two_bump_crawler_beats_nine_tenths_of_the_bound():
+    p = SIDEWAYS.with_(epsilon=0.01, delta=2.5e-7).period(intervals=1, quadrature_tolerance=1e-8)
+    assert 0.9 / SIDEWAYS.friction.mu_t < p.efficiency < SIDEWAYS.bound
+
+
+def test_backwards_is_forwards_with_the_coefficients_exchanged():
+    forwards = ONE.with_(friction=Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3))
+    backwards = ONE.with_(friction=Friction(mu_t=1.7, mu_f=1.3, mu_b=1.0), backwards=True)
+    a, b = (c.period(intervals=1, nodes=4) for c in (forwards, backwards))
+    assert a.efficiency == pytest.approx(b.efficiency, rel=1e-8)
+
+
+def test_a_bump_that_takes_half_its_region_tears_the_anchor_loose_on_very_rough_sideways_friction():
+    """With mu_t = 10 the bump drags harder than the anchor's margin; a smaller share of the region
+    mends it."""
+    rough = ONE.with_(friction=Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), epsilon=0.02)
+    loose, firm = (rough.with_(share=share).period(intervals=1, nodes=4) for share in (0.5, 0.15))
+    assert loose.d < 0.8 * rough.body.stroke
+    assert firm.d == pytest.approx(rough.with_(share=0.15).body.stroke, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_the_error_bar_covers_a_much_smaller_delta():
+    crawler = ONE.with_(epsilon=0.01, delta=delta_for(0.01))
+    point = epsilon_point(crawler)
+    harder = crawler.with_(delta=crawler.delta / 100).period(intervals=2)
+    assert abs(harder.efficiency - point.efficiency) < 1.1 * point.errors["efficiency"]

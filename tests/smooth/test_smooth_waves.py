@@ -1,12 +1,25 @@
-"""Waves of smooth bodies: references, symmetries, and chains of links against them."""
+"""Waves of smooth bodies: references, symmetries, chains of links against them; and prescribed
+motions as problems with nothing free, certified and kept like gaits that were searched."""
 
 import numpy as np
 import pytest
 
+from colloc.commands.results import export
+from colloc.gaits.gait_fields import BODIES as KINDS
+from colloc.gaits.gait_fields import CLASSES, fields, part_from
+from colloc.gaits.prescribed import Prescribed
+from colloc.gaits.problem import Problem
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.friction import Friction
+from colloc.pictures.movie import frames
+from colloc.pictures.report_page import report_page
+from colloc.results.motion import friction_arrows
+from colloc.results.solution import SOLVED
+from colloc.results.store import load, save
+from colloc.search.explore import first_optimum
+from colloc.search.solve import solve
 from colloc.smooth.balance import Motion
-from colloc.smooth.prescribed_body import Wave
-from colloc.system.errors import ProblemError
+from colloc.smooth.prescribed_body import Concertina, Wave, schedule
 from scripts.models.period import measured_period, period
 from tests.shared.chain_period import chain_period
 
@@ -65,12 +78,8 @@ def test_the_half_period_and_the_whole_agree():
     """The mirror-image second half, computed instead of inferred."""
     wave = Wave().prescribed()
     whole = Motion(wave.angle, wave.rate, stages=(0.0, 0.5, 1.0))
-    a, b = (
-        period(
-            m, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), 1e-3, intervals=3, quadrature_tolerance=1e-8
-        )
-        for m in (wave, whole)
-    )
+    law, finely = Friction(mu_t=10, mu_f=1, mu_b=1), {"quadrature_tolerance": 1e-8}
+    a, b = (period(m, law, 1e-3, intervals=3, **finely) for m in (wave, whole))
     assert a.d == pytest.approx(b.d, abs=1e-8)
     assert pytest.approx(b.W, abs=1e-8) == a.W
     assert abs(b.rotation) < 1e-10
@@ -82,8 +91,70 @@ def test_no_wave_beats_the_bound(friction):
         assert period(wave, friction, 1e-4, intervals=1).efficiency < 1 / friction.smallest
 
 
-def test_unusable_studies_are_refused():
-    with pytest.raises(ProblemError, match="intervals must be at least 1"):
-        period(Wave().prescribed(), Friction(), 1e-3, intervals=0)
-    with pytest.raises(ProblemError, match="antipodal"):
-        chain_period(Motion(lambda s, t: s, lambda s, t: s), Friction(), 1e-3, 5)
+BODIES = [Wave(), Wave("tanh", 1.3, 2.0), Wave("standing")]
+BODIES += [Concertina(0.2), Concertina(0.1, bumps=2)]
+
+
+@pytest.fixture(scope="module")
+def wave():
+    return solve(Problem("wave", body=Wave(), friction=ALONG, delta=1e-3))
+
+
+def test_the_paper_s_wave_is_certified_and_agrees_with_its_own_period(wave):
+    assert wave.status == SOLVED, wave.message
+    reference = measured_period(Wave().prescribed(), ALONG, 1e-3)
+    assert wave.certificate.efficiency == pytest.approx(reference.efficiency, abs=1e-9)
+    assert wave.certificate.distance == pytest.approx(reference.d, abs=1e-9)
+    assert wave.answer.program == "prescribed"
+
+
+@pytest.mark.parametrize("body", BODIES[:3], ids=str)
+def test_the_largest_angle_at_an_instant_is_that_of_the_steepest_point(body):
+    phases = np.linspace(0, 1, 7)
+    angles = np.stack([np.cos(2 * np.pi * phases), np.sin(2 * np.pi * phases)])
+    places = np.linspace(0, 1, 4001)[:, None]
+    steepest = [np.abs(body.tangent(places, angles[:, [k]])).max() for k in range(7)]
+    np.testing.assert_allclose(body.bounded_angles.largest(angles), steepest, rtol=1e-3, atol=1e-3)
+
+
+def test_it_is_read_as_it_was_written(wave, tmp_path):
+    read = load(save(wave, tmp_path / "wave.h5"))
+    assert (read.problem.hash, read.problem.body) == (wave.problem.hash, Wave())
+    assert read.problem.gait == wave.problem.gait
+    np.testing.assert_array_equal(read.sample(0.7).tail, wave.sample(0.7).tail)
+    assert frames(read, count=5).ends.shape == (2, 97, 5)
+    assert export([str(tmp_path / "wave.h5"), "--period", "1"]) == 2
+
+
+def test_the_friction_that_is_drawn_has_no_resultant():
+    """The body is in balance, and its arrows stand in the middles of 96 parts of its outline, which
+    show a part at stick as one arrow: the mean of so many is off by a percent."""
+    body, t = Wave(), np.linspace(0.0, 0.4, 5)
+    gait = Prescribed(schedule(body), "antipodal").member(np.empty(0), 2)
+    at = (ALONG, gait.angles(t), gait.rates(t), 1e-2)
+    _, force = friction_arrows(body, *at, body.solve(*at).z, count=96)
+    np.testing.assert_allclose(force.mean(axis=1), 0.0, atol=2e-2 * np.abs(force).max())
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])
+def test_the_work_on_the_mesh_is_that_of_the_general_solver(body):
+    friction, same = Friction(mu_t=2.0, mu_f=1.0, mu_b=1.0), {"mesh_tolerance": 0}
+    problem = Problem("any", None, body, friction, delta=1e-2, scheme="gauss-2", **same)
+    # the same quadrature in time
+    reference = period(body.prescribed(), friction, 1e-2, intervals=4, nodes=2)
+    optimum = first_optimum(problem, problem.guess)
+    assert optimum.step.work == pytest.approx(reference.W, rel=1e-6)
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])
+def test_bodies_answer_every_question_and_can_be_kept(body):
+    assert isinstance(body, Body)
+    assert part_from(KINDS, fields(body)) == body
+    gait, stages = Problem("any", body=body).gait, body.prescribed().stages
+    assert gait == part_from(CLASSES, fields(gait)) == Prescribed(stages, body.symmetries[0])
+
+
+@pytest.mark.slow
+def test_it_gets_a_report_and_a_figure(wave):
+    assert "a sine wave of amplitude 1 rad" in report_page(wave)
+    assert len(wave.plot().axes) == 5

@@ -17,8 +17,10 @@ from shared.store_samples import load_study
 
 import colloc
 from colloc import BSpline, Chain, Corners, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc.commands.families import sweep as main
 from colloc.commands.families import sweep as sweep_study
 from colloc.commands.families import sweep_summary
+from colloc.commands.main import main as colloc_main
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.linear import Combination
@@ -152,44 +154,15 @@ def test_starts_travel_from_the_value_before_and_between_all_texts():
     assert study.problem_at((1, 1, 0)).friction.mu_t == 2.0
 
 
-BAD = r"""
-grid(axes=()) -> at least one Axis
-grid(axes=(Axis("x", (1,)), Axis("x", (2,)))) -> same name
-grid(name="a b") -> name must be
-grid(chunk=0) -> chunk must be
-grid(time_limit="long") -> must be positive
-grid(problem=3) -> must be a function
-grid(axes=(Axis("x", range(1001)), Axis("y", range(1001)))) -> 1000000 cells
-Axis("x", (1.0, None)) -> values of an axis must be numbers
-Axis("x", ([1.0, 2.0],)) -> values of an axis must be numbers
-Axis("x", ()) -> axis x
-Axis("x", (1.0, 1.0)) -> axis x
-Axis("x", (1.0, "a")) -> axis x
-Axis("x", (float("nan"),)) -> axis x
-"""
-
-
-@pytest.mark.parametrize("line", BAD.strip().splitlines())
-def test_bad_studies_and_axes_are_refused_in_one_sentence(line):
-    made, words = line.split(" -> ")
-    with pytest.raises(ProblemError, match=words):
-        eval(made)
-
-
 def test_a_study_file_is_code_and_its_mistakes_are_named_with_their_line(tmp_path):
-    for text, message in (
-        ("x = 1", "states no STUDY"),
-        ("\n1/0", "line 2: ZeroDivisionError"),
-        ("STUDY = 3", "must be a Study"),
-    ):
+    wrong = {"x = 1": "no STUDY", "\n1/0": "line 2: ZeroDivisionError", "STUDY = 3": "be a Study"}
+    for text, message in wrong.items():
         with pytest.raises(ProblemError, match=message):
             read_study_file(study_file(tmp_path, text))
     study, source = read_study_file(study_file(tmp_path))
     assert (study.shape, source) == ((2, 1), FILE)
-    for law, what in (
-        ("Frction(mu_t=mu_t", "NameError: "),
-        ("Friction(mu_t=-mu_t", "friction.mu_t"),
-    ):
+    laws = {"Frction(mu_t=mu_t": "NameError: ", "Friction(mu_t=-mu_t": "friction.mu_t"}
+    for law, what in laws.items():
         path = study_file(tmp_path, FILE.replace("Friction(mu_t=mu_t", law))
         said = rf"no problem at mu_t = 1.0, mu_b = 1.0: .*tiny\.py, line 6: {what}"
         with pytest.raises(ProblemError, match=said):
@@ -442,10 +415,8 @@ def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_ke
     assert set(table["status"]) == {SOLVED}
     triangle = triangles.best.outcome.gait
     assert table["delta"][1] == pytest.approx(1e-4 * triangle.length)
-    series, t = (
-        Fourier(*(table[name][1] for name in ("mean", "cos", "sin"))),
-        np.linspace(0, 1, 100),
-    )
+    t = np.linspace(0, 1, 100)
+    series = Fourier(*(table[name][1] for name in ("mean", "cos", "sin")))
     np.testing.assert_allclose(series.angles(t), triangle.angles(t), atol=0.2)
     assert np.isnan(table["cos"][0, :, 1:]).all()
 
@@ -491,13 +462,13 @@ def test_what_is_off_by_a_hundredth_of_a_gait_still_counts_as_symmetric(size):
 
 
 def test_a_gait_is_standing_if_it_goes_back_its_way_or_hardly_has_a_wave_or_hardly_moves_along_itself():
-    for retraced, wave, forward, kind in (
-        (True, 1, 1, "standing (retraced), none"),
-        (False, 0.04, 1, "standing, none"),
-        (False, 0.5, 0.04, "standing, none"),
-        (False, -0.5, -0.3, "direct, none"),
+    assert class_name(False, False, True, 1, 1) == "standing (retraced), none"
+    for wave, forward, kind in (
+        (0.04, 1, "standing"),
+        (0.5, 0.04, "standing"),
+        (-0.5, -0.3, "direct"),
     ):
-        assert class_name(False, False, retraced, wave, forward) == kind
+        assert class_name(False, False, False, wave, forward) == f"{kind}, none"
 
 
 @pytest.mark.parametrize(("mu_t", "kind"), [(20.0, "retrograde, both"), (0.1, "direct, both")])
@@ -521,10 +492,8 @@ def test_the_name_of_a_gait_is_the_same_in_every_process():
 
 
 def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
-    words, out = (
-        [str(study_file(tmp_path)), "--output", f"{tmp_path}/out put"],
-        tmp_path / "out put",
-    )
+    out = tmp_path / "out put"
+    words = [str(study_file(tmp_path)), "--output", str(out)]
     assert sweep_study(words) == 0
     printed = capsys.readouterr().out
     assert "2 cells, 0 of them in the journal" in printed
@@ -556,3 +525,51 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
     reported = sum("round 0" in line for line in [*lines, *rest.splitlines()])
     assert reported >= 2
     assert np.sum(load_study(tmp_path / "tiny.nc").variables["efficiency"] > 0) >= reported
+
+
+STUDY = """
+from colloc import Axis, Friction, Harmonic, ModalBody, Problem, Study
+
+def problem(mu_t):
+    body, gait = ModalBody(2, panels=4), Harmonic(1, "antipodal")
+    return Problem("modes", body=body, friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1), gait=gait, delta=0.02, intervals=8)
+
+STUDY = Study("modes", (Axis("mu_t", (100.0, 50.0)),), problem, cold_starts=0, warm_starts=1)
+"""
+
+
+@pytest.mark.slow
+def test_gaits_of_modes_travel_between_neighbours_and_are_kept(tmp_path, capsys):
+    (tmp_path / "study.py").write_text(STUDY)
+    assert main([str(tmp_path / "study.py"), "--output", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
+    best = load_study(tmp_path / "modes.nc").variables["efficiency"]
+    assert float(best[0]) > float(best[1]) > 0.3  # more friction sideways helps
+
+
+PRESCRIBED = """
+from colloc import Axis, Friction, Problem, Study, Wave
+
+def problem(mu_t):
+    return Problem("waves", body=Wave("sine"), friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-3)
+
+PROBLEM = problem(100.0)
+STUDY = Study("waves", (Axis("mu_t", (100.0, 50.0)),), problem)
+"""
+
+
+def test_a_sweep_of_prescribed_motions_measures_each_once(tmp_path, capsys):
+    """Nothing travels between neighbours and nothing is sampled where nothing is free."""
+    (tmp_path / "study.py").write_text(PRESCRIBED)
+    assert main([str(tmp_path / "study.py"), "--output", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
+    study = load_study(tmp_path / "waves.nc").variables
+    assert study["efficiency"][0] > study["efficiency"][1] > 0.5
+    assert study["starts"].tolist() == [1, 1]
+
+
+@pytest.mark.parametrize("command", ["multistart", "pareto"])
+def test_what_needs_free_gaits_refuses_a_prescribed_motion_in_words(tmp_path, capsys, command):
+    (tmp_path / "wave.py").write_text(PRESCRIBED)
+    assert colloc_main([command, str(tmp_path / "wave.py"), "--output", f"{tmp_path}/"]) == 2
+    assert "prescribed motion" in capsys.readouterr().err

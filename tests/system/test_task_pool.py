@@ -169,3 +169,23 @@ def test_ctrl_c_while_a_task_is_handed_over_leaves_the_executors_locks_open():
     with pytest.raises(KeyboardInterrupt):
         list(run_tasks(doubled, listed([Task(1, (1,))]), workers=1, executor=Locked))
     assert not Locked.lock.locked()
+
+
+PROGRAM = """
+import os
+from colloc.system.environment import one_thread_each
+one_thread_each()
+print(os.environ["OPENBLAS_NUM_THREADS"])
+"""
+
+
+def said(environment):
+    return subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True
+    ).stdout.strip()
+
+
+def test_linear_algebra_uses_one_thread_unless_the_environment_says_otherwise():
+    bare = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    assert said(bare) == "1"
+    assert said({**bare, "OPENBLAS_NUM_THREADS": "3"}) == "3"

@@ -67,13 +67,8 @@ def test_effort_of_a_solve(solved, name, iterations, levels):
 
 def test_balance_solves_an_iteration_asks_for():
     """Value, Jacobian and Hessian at one point share one solve of the balance."""
-    problem = Problem(
-        "p",
-        ellipse(0.3, 1, 0.5),
-        gait=Harmonic(1, "bilateral"),
-        intervals=12,
-        formulation="implicit velocity",
-    )
+    stated = {"gait": Harmonic(1, "bilateral"), "formulation": "implicit velocity"}
+    problem = Problem("p", ellipse(0.3, 1, 0.5), intervals=12, **stated)
     program = program_of(problem)
     x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
     result = Solver(program).solve_within(x, 0.1, None, 1.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Quantity, Wheel, ellipse
+from colloc import Chain, Foot, Free, Friction, Harmonic, Pad, Problem, Quantity, Wheel, ellipse
 from colloc.mechanics.balance import joint_moments
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver, solve_in_regions
@@ -21,12 +21,8 @@ SKEW = Chain((0.3, 0.25, 0.45))
 ROUGH = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 LOOP = ellipse(0.2, 1.3, 0.8)
 HEAT = Quantity("heat", "sum(moment**2)")
-PARTS = (
-    Foot(0),
-    Wheel(1, 0.3, rolling=0.1),
-    Pad(2, 0.2, 0.6),
-    *(Foot(2, 0.9, offset=y) for y in (0.05, -0.05)),
-)
+PARTS = (Foot(0), Wheel(1, 0.3, rolling=0.1), Pad(2, 0.2, 0.6))
+PARTS += tuple(Foot(2, 0.9, offset=y) for y in (0.05, -0.05))
 CASES = """
 lying: body=SKEW
 symmetric: gait=Harmonic(2, "bilateral"), guess=ellipse(0.0, 1.3, 0.8)
@@ -50,32 +46,42 @@ uphill, any way: grade=0.1
 inertia: froude=0.3, body=SKEW
 inertia on feet: froude=0.3, body=Chain(SKEW.lengths, feet=PARTS, masses=(0.2, 0.3, 0.5))
 inertia uphill: froude=0.3, grade=0.1
-free pace: froude=Free(0.01, 1.0), objective="distance / (work + 0.1 * period)"
+free pace: **PACED
 turning: rotation=None, objective="turning", gait=Harmonic(1)
 actuators: torque_limit=0.05, power_limit=0.4
 quantities: objective=Objective("distance / (work + heat)", quantities=(HEAT,))
 driven: objective="driven efficiency", grade=0.1
 driven with inertia: objective="driven efficiency", froude=0.3, grade=0.1
 driven at a free pace: objective="distance / (driven_work + 0.1 * period)", froude=Free(0.01, 1.0)
+uphill on feet, across, with motors: **STEEP, body=FEET, towards=2.0, torque_limit=0.05
+uphill, with masses: **STEEP, body=Chain(SKEW.lengths, weights=(0.5, 0.2, 0.3)), gait=Harmonic(2)
+snake uphill: **STEEP, body=SKEW, gait=Serpenoid(2), guess=None
+polygon uphill: **STEEP, body=SKEW, **SIDES
+polygon uphill, across, with motors: **STEEP, **SIDES, towards=2.0, torque_limit=0.05
+motors with inertia: froude=0.2, body=SKEW, gait=Harmonic(2), torque_limit=0.05, power_limit=0.1
+motors with inertia at a free pace: **PACED, body=SKEW, torque_limit=0.05
+motors with inertia uphill: froude=0.2, grade=0.1, body=SKEW, gait=BSpline(8), torque_limit=0.05
+serpenoid of two harmonics: body=Chain((0.2,) * 5), gait=Serpenoid(2, "bilateral"), guess=None
+antipodal serpenoid: body=Chain((0.2,) * 5), gait=Serpenoid(3, "antipodal"), guess=None
 at least: at_least={"distance": 0.1, "efficiency": 0.2}
 joint speeds: speed_limit=9.0
 modes: body=ModalBody(3), gait=Harmonic(1, "antipodal"), guess=None
 velocity map: formulation="implicit velocity", body=SKEW
 """
+PACED = {"froude": Free(0.01, 1.0), "objective": "distance / (work + 0.1 * period)"}
+SIDES = {"gait": colloc.Polygon(5), "guess": ellipse(0.1, 1.6, 1.1), "intervals": 10}
+STEEP = {"objective": "driven efficiency", "grade": 0.2}
+FEET = Chain(
+    (0.2, 0.5, 0.3), masses=(0.4, 0.3, 0.3), feet=(Foot(0), Pad(1, 0.1, 0.6), Wheel(2, rolling=0.5))
+)
 FOUR, GEARS, WIDE = Chain((0.25,) * 4), ((1, 0), (0.5, 0.5), (0, 1)), ellipse(0.1, 1.6, 1.1)
 WAVE = colloc.Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])
 CASES = cases(CASES, globals())
 
 
 def stated(case, **changes):
-    fields = {"guess": LOOP, "friction": ROUGH, "gait": Harmonic(1), "intervals": 8}
-    fields |= CASES[case] | changes
-    return Problem(
-        "p",
-        **{
-            name: value for name, value in fields.items() if value is not None or name == "rotation"
-        },
-    )
+    usual = {"guess": LOOP, "friction": ROUGH, "gait": Harmonic(1), "intervals": 8}
+    return Problem("p", **usual | CASES[case] | changes)
 
 
 def at_guess(problem, delta=0.1):
@@ -105,6 +111,9 @@ def test_it_has_the_value_and_the_rows_of_the_reduced_program(case):
             of_group = equations[group]
             off = (g[group] - full.row_lower[group])[of_group]
             assert np.abs(off).max(initial=0.0) < 1e-9, name
+    if full.control.problem.grade:
+        turned = reduced.motion.values(v, 0.1)["rotation"]
+        assert np.abs(g[full.groups["rotation"]]).max() == pytest.approx(abs(turned), abs=1e-9)
     if AT_LEAST in full.groups:
         number = len(full.control.aims.at_least)
         start = reduced.row_lower.size - reduced.constraints.lower.size - number
@@ -112,12 +121,10 @@ def test_it_has_the_value_and_the_rows_of_the_reduced_program(case):
             g[full.groups[AT_LEAST]], reduced.rows(v)[start : start + number], atol=1e-9
         )
     if ACTUATORS in full.groups:
-        share, point = reduced.actuators.placed
-        shares = g[full.groups[ACTUATORS]].reshape(-1, len(full.control.actuators.names))
-        assert share.size > 4
-        np.testing.assert_allclose(
-            shares[point, share], reduced.actuators.values(v, 0.1), atol=1e-9
-        )
+        shares = g[full.groups[ACTUATORS]].reshape(-1, len(full.control.actuators.names)).T
+        for at in ((), (full.mesh.times,)):  # on the mesh, or at any instants
+            known = reduced.motion.shares(full.control.actuators, v, 0.1, *at)
+            np.testing.assert_allclose(shares, known, atol=1e-9)
     on_rows = reduced.rows(v)[reduced.row_lower.size - reduced.constraints.lower.size :]
     start = 0
     for name, cells in reduced.constraints.kinds.items():
@@ -216,13 +223,8 @@ def test_nonzeros_grow_by_so_many_for_every_interval(links, formulation, jacobia
     mesh."""
     counts = []
     for intervals in (20, 40):
-        problem = Problem(
-            "p",
-            body=Chain((1 / links,) * links),
-            gait=Harmonic(1, "antipodal"),
-            intervals=intervals,
-            formulation=formulation,
-        )
+        stated = {"gait": Harmonic(1, "antipodal"), "formulation": formulation}
+        problem = Problem("p", None, Chain((1 / links,) * links), intervals=intervals, **stated)
         functions = program_of(problem).nlp.functions
         counts.append((functions["jac_g"].nnz_out(1), functions["hess_lag"].nnz_out(0)))
     growth = np.diff(counts, axis=0)[0] / 20

@@ -1,4 +1,7 @@
-"""HDF5 files of results: what texts and numbers become, and what is refused."""
+"""Rows by key: kept to the bit, all of a call or none."""
+
+import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -6,8 +9,103 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shared.store_samples import HDF5_KINDS, Samples
 
+from benchmarks.tables import cached
 from colloc.system.errors import StoreError
+from colloc.system.row_file import CACHE, put_rows, read_rows
 from colloc.system.store_file import array, attribute, mark, new_file, open_file, put, put_attribute
+
+KIND = "colloc test 1"
+
+
+def test_rows_come_back_as_they_were_in_the_order_in_which_their_keys_came(tmp_path):
+    path = tmp_path / "ö new" / "x?#%.sqlite"
+    assert read_rows(path, KIND) == {}
+    put_rows(path, KIND, {"b": [1 / 3, -0.0, 1e-300], "a": {"ä": None}})
+    put_rows(path, KIND, {"c": 2**60, "b": [2 / 3]})
+    assert list(read_rows(path, KIND).items()) == [("b", [2 / 3]), ("a", {"ä": None}), ("c", 2**60)]
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+def with_statement(path, statement):
+    put_rows(path, KIND, {"a": 1})
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(statement)
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        f'CREATE TRIGGER t AFTER INSERT ON "{KIND}" BEGIN DELETE FROM "{KIND}"; END',
+        "CREATE VIEW v AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT x "
+        "FROM c",
+        "CREATE TABLE other (a)",
+    ],
+)
+def test_a_file_with_anything_but_its_one_table_is_refused_by_readers_and_writers(
+    statement, tmp_path
+):
+    path = tmp_path / "x.sqlite"
+    with_statement(path, statement)
+    before = path.read_bytes()
+    for attempt in (lambda: read_rows(path, KIND), lambda: put_rows(path, KIND, {"b": 2})):
+        with pytest.raises(StoreError, match="is not a colloc test 1"):
+            attempt()
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("row", ["'b', NULL", "'c', 'd'", "'e', '{0}'", "'f', x'00'"])
+def test_a_file_with_a_row_that_cannot_be_read_is_refused_in_a_sentence(row, tmp_path):
+    path = tmp_path / "x.sqlite"
+    with_statement(path, f'INSERT INTO "{KIND}" VALUES ({row.format("[" * 100_000)})')
+    with pytest.raises(StoreError, match=f"x.sqlite cannot be read as a {KIND}"):
+        read_rows(path, KIND)
+
+
+@pytest.mark.parametrize("content", [b"short", b"text " * 1000, b"SQLite format 3\0" + bytes(5000)])
+def test_what_is_no_database_is_refused_in_a_sentence_and_left_as_it_is(content, tmp_path):
+    path = tmp_path / "x.sqlite"
+    path.write_bytes(content)
+    for attempt in (lambda: read_rows(path, KIND), lambda: put_rows(path, KIND, {"b": 2})):
+        with pytest.raises(StoreError, match=r"no database|not a database"):
+            attempt()
+    assert path.read_bytes() == content
+
+
+def test_damaged_pages_are_refused_in_a_sentence_or_read(tmp_path):
+    path, whole = tmp_path / "x.sqlite", {f"key{k}": [k / 3] * 10 for k in range(100)}
+    put_rows(path, KIND, whole)
+    data, rng, said = path.read_bytes(), np.random.default_rng(1), []
+    for begin in rng.integers(len(data) - 100, size=20):
+        path.write_bytes(data[:begin] + rng.bytes(100) + data[begin + 100 :])
+        try:
+            said.append(f"{path} {len(read_rows(path, KIND))} rows")
+        except StoreError as error:
+            said.append(str(error))
+    assert all(each.startswith(f"{path} ") for each in said)
+
+
+def test_a_reader_finishes_what_a_killed_writer_began(tmp_path):
+    """The file in the middle of a transaction, with its rollback journal, as kill -9 leaves
+    both."""
+    path, left = tmp_path / "x.sqlite", tmp_path / "left.sqlite"
+    put_rows(path, KIND, {"a": "x" * 10_000})
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        connection.execute("PRAGMA cache_size = 1")  # so that pages are written before the end
+        connection.execute("BEGIN IMMEDIATE")
+        connection.execute(f"""UPDATE "{KIND}" SET value = '{"y" * 100_000}'""")
+        left.write_bytes(path.read_bytes())
+        left.with_name("left.sqlite-journal").write_bytes(
+            (tmp_path / "x.sqlite-journal").read_bytes()
+        )
+    assert read_rows(left, KIND) == {"a": "x" * 10_000}
+
+
+def test_a_value_is_computed_once(tmp_path):
+    path = tmp_path / "x.sqlite"
+    assert cached(path, "key", lambda: (1, 2)) == [1, 2]
+    assert cached(path, "key", lambda: pytest.fail("not taken from the file")) == [1, 2]
+    assert read_rows(path, CACHE) == {"key": [1, 2]}
+
 
 TEXTS = ["", "1", "ä", "Reibung \N{GREEK SMALL LETTER MU}_t / µ_f", "tab\tand\nline", "nul\0inside"]
 TEXTS += ["\N{SNAKE}" * 500]
