@@ -155,6 +155,7 @@ def test_pairs_cross_whose_ends_lie_on_both_sides_of_each_other(width):
         }
         pairs = overlapping_pairs(np.stack(body.joints(angles)), far_pairs(body), width, 0.0)
         assert crossed <= set(pairs) if width else crossed == set(pairs)
+        assert all(crossing_depth(body, angles, [pair])[0] > 0 for pair in crossed)
         found += len(crossed)
     assert found > 50
 

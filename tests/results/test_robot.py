@@ -80,9 +80,17 @@ def test_how_numbers_grow_with_size_mass_gravity_and_pace(three_link, robot):
     assert slow == pytest.approx(1 / three_link.efficiency, rel=1e-4)
 
 
-def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(three_link, tmp_path):
-    facts = three_link.robot(**SIZE, max_speed=[2.0, 3.0]).facts
-    at_it = three_link.robot(1.2, 3, facts["shortest_period_s"]).facts
+@pytest.fixture(scope="module")
+def hurried(three_link):
+    """A robot whose motors are too slow for its pace, and one at the pace that they allow."""
+    robot = three_link.robot(**SIZE, max_speed=[2.0, 3.0])
+    return robot, three_link.robot(1.2, 3, robot.facts["shortest_period_s"]).facts
+
+
+def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(
+    three_link, hurried, tmp_path
+):
+    facts, at_it = hurried[0].facts, hurried[1]
     assert max(np.array(at_it["peak_speed_rad_per_s"]) / [2, 3]) == pytest.approx(1, rel=1e-4)
     exported = three_link.export(tmp_path / "x.csv", max_speed=[2, 3], rate=1000)
     assert facts["shortest_period_paced_by_speed_s"] == pytest.approx(
@@ -110,12 +118,13 @@ def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
     np.testing.assert_allclose(end, [played.distance, 0.0], atol=2e-3)
 
 
-def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_as_they_allow(three_link):
+def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_as_they_allow(
+    three_link, hurried
+):
     """No limit to solve with is advised: such a gait may be slower."""
-    robot = three_link.robot(1.2, 3, 5, max_speed=[2, 3])
-    sheet, facts = str(robot), robot.facts
-    slower = three_link.robot(1.2, 3, facts["shortest_period_s"]).facts["speed_m_per_s"]
-    assert facts["speed_at_shortest_period_m_per_s"] == pytest.approx(slower, rel=1e-6)
+    robot, slower = hurried[0], hurried[1]["speed_m_per_s"]
+    sheet = str(robot)
+    assert robot.facts["speed_at_shortest_period_m_per_s"] == pytest.approx(slower, rel=1e-6)
     assert f"with the gait's own timing ({slower:.4g} m/s)" in sheet
     assert "is too short for the joints" in sheet
     assert "speed_limit" not in sheet
