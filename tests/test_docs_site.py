@@ -50,19 +50,14 @@ def test_a_link_of_the_repository_leads_to_the_page_that_shows_it(link, page, be
 
 @pytest.fixture
 def program():
-    return browser() or pytest.skip(
-        "no browser is installed here: chromium, chromium-browser or google-chrome"
-    )
+    return browser() or pytest.skip("no chromium, chromium-browser or google-chrome is installed")
 
 
 @pytest.mark.slow
 def test_in_a_browser_no_page_is_too_wide_dark_is_dark_and_the_search_finds(program, tmp_path):
-    subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "-q", "-d", tmp_path], cwd=ROOT, check=True
-    )
-    assert [
-        line for dark in (False, True) for line in complaints(program, tmp_path, dark=dark)
-    ] == []
+    build = [sys.executable, "-m", "mkdocs", "build", "-q", "-d", tmp_path]
+    subprocess.run(build, cwd=ROOT, check=True)
+    assert [complaints(program, tmp_path, dark=dark) for dark in (False, True)] == [[], []]
 
 
 @pytest.mark.slow
@@ -74,6 +69,4 @@ def test_a_checker_of_accessibility_finds_nothing_serious_in_a_report(
         pytest.skip("there is no build/package/axe.min.js: npm pack axe-core, as .ci/run does")
     three_link.report(tmp_path / "report.html")
     text = axe.read_text(encoding="utf-8")
-    assert [
-        line for dark in (False, True) for line in complaints(program, tmp_path, text, dark=dark)
-    ] == []
+    assert [complaints(program, tmp_path, text, dark=dark) for dark in (False, True)] == [[], []]

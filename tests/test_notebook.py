@@ -31,13 +31,9 @@ def numbers(text):
 
 def test_it_was_run_once_from_top_to_bottom_without_an_error():
     assert [cell["execution_count"] for cell in CODE] == list(range(1, len(CODE) + 1))
-    assert not [
-        o
-        for cell in CODE
-        for o in cell["outputs"]
-        if o["output_type"] == "error" or o.get("name") == "stderr"
-    ]
-    kinds = {kind for cell in CODE for o in cell["outputs"] for kind in o.get("data", {})}
+    outputs = [output for cell in CODE for output in cell["outputs"]]
+    assert not [o for o in outputs if o["output_type"] == "error" or o.get("name") == "stderr"]
+    kinds = {kind for output in outputs for kind in output.get("data", {})}
     assert {"image/png", "image/gif", "text/html"} <= kinds
 
 

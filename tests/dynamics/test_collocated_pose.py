@@ -53,10 +53,8 @@ def test_the_displacement_has_the_slopes_of_differences(name):
 
     def ahead(*rates):
         turn, forwards, left = rates
-        return (
-            CollocatedPose(mesh.scheme, mesh.h, turn, forwards + 1j * left).place[-1]
-            * np.conj(axis)
-        ).real
+        end = CollocatedPose(mesh.scheme, mesh.h, turn, forwards + 1j * left).place[-1]
+        return (end * np.conj(axis)).real
 
     found = CollocatedPose(mesh.scheme, mesh.h, omega, x + 1j * y)
     on_theta, (on_centre,) = found.on_pose(np.array([axis]))
@@ -73,9 +71,7 @@ def test_a_gait_goes_where_its_whole_period_leads():
     displacement, rotation = 0.3 * np.exp(0.9j), 0.5
     whole = displacement + np.exp(1j * rotation) * np.conj(displacement)
     for end in (displacement, -displacement):
-        sign = 1 if end == displacement else -1
-        assert np.exp(1j * heading(ANTIPODAL, end, rotation)) == pytest.approx(
-            sign * whole / abs(whole)
-        )
+        ahead = (1 if end == displacement else -1) * whole / abs(whole)
+        assert np.exp(1j * heading(ANTIPODAL, end, rotation)) == pytest.approx(ahead)
     for symmetry in (NONE, BILATERAL):
         assert heading(symmetry, displacement, rotation) == pytest.approx(0.9)

@@ -41,9 +41,8 @@ def test_a_jump_of_the_rates_is_met_from_both_sides():
 
     ran = integrate_period(rates, np.zeros(1), 1e-6, breaks=(0.3,))
     assert 0.3 not in seen
-    np.testing.assert_allclose(
-        ran.at(np.array([0.15, 0.3, 0.65])), [[-0.15, -0.3, 0.75]], atol=1e-9
-    )
+    states = ran.at(np.array([0.15, 0.3, 0.65]))
+    np.testing.assert_allclose(states, [[-0.15, -0.3, 0.75]], atol=1e-9)
     assert ran.states[0, -1] == pytest.approx(1.8, abs=1e-9)
 
 

@@ -32,19 +32,15 @@ def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
     np.testing.assert_allclose(driven(0.0), 2 * 0.5 * idle, rtol=1e-12)
     h = 1e-5 * idle
     slope = (driven(h) - driven(-h)) / (2 * h)
-    np.testing.assert_allclose(
-        slope,
-        0.5 * Instants(BODY, law, angles, rates, delta, moments=moments).power.sum(axis=0),
-        rtol=1e-6,
-    )
+    power = Instants(BODY, law, angles, rates, delta, moments=moments).power.sum(axis=0)
+    np.testing.assert_allclose(slope, 0.5 * power, rtol=1e-6)
 
 
 def test_torques_are_limited_both_ways_and_powers_one_way():
     """In the program's bounds and in a replay: a gait in a mirror needs the same torques."""
     np.testing.assert_array_equal(ONE.least, [-1.0, -1.0, -np.inf, -np.inf])
-    program = program_of(
-        Problem("limited", gait=Harmonic(1), torque_limit=0.1, power_limit=0.5, intervals=6)
-    )
+    limits = {"torque_limit": 0.1, "power_limit": 0.5}
+    program = program_of(Problem("limited", gait=Harmonic(1), intervals=6, **limits))
     rows = program.groups[ACTUATORS]
     assert set(program.row_upper[rows]) == {1.0}
     assert sorted(set(program.row_lower[rows])) == [-np.inf, -1.0]

@@ -1,7 +1,6 @@
 """A result takes its place without loss: what was there and is better, or another, is kept."""
 
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -50,14 +49,8 @@ def test_a_better_answer_to_the_same_question_is_kept_and_a_worse_or_equal_one_r
     three_link, tmp_path
 ):
     path = tmp_path / "x.h5"
-    for value, former in (
-        (0.2, None),
-        (0.3, None),
-        (0.3 - 1e-9, None),
-        (0.25, 1),
-        (0.3, None),
-        (0.1, 1),
-    ):
+    pairs = (0.2, None), (0.3, None), (0.3 - 1e-9, None), (0.25, 1), (0.3, None), (0.1, 1)
+    for value, former in pairs:
         (saved,) = save_result(valued(three_link, value, intervals=30 + int(100 * value)), path)
         assert saved.former == (former and tmp_path / "x.former-1.h5")
         assert load(path).certificate.value == value
@@ -83,10 +76,8 @@ def test_on_a_file_system_without_locks_a_result_is_read_and_replaced(three_link
         from colloc.results.store import load
         path = Path({str(path)!r})
         print(save_result(load(path), path)[0].former)"""
-    environment = {**os.environ, "LD_PRELOAD": str(library)}
-    ran = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True
-    )
+    how = {"env": {**os.environ, "LD_PRELOAD": str(library)}, "capture_output": True, "text": True}
+    ran = subprocess.run([sys.executable, "-c", code], **how)
     assert (ran.stdout, ran.stderr) == ("None\n", "")
 
 
@@ -151,13 +142,10 @@ def test_of_many_problems_that_are_saved_at_once_none_is_lost(three_link, tmp_pa
 def test_solve_says_where_the_result_of_another_problem_of_this_name_went(tmp_path, capsys):
     for delta in ("2e-2", "1e-2"):
         (tmp_path / "p.py").write_text(FILE.replace("DELTA", delta))
-        assert colloc(
-            ["solve", str(tmp_path / "p.py"), "--starts", "1", "--output", f"{tmp_path}/"]
-        ) in (0, 4)
+        words = ["solve", f"{tmp_path}/p.py", "--starts", "1", "--output", f"{tmp_path}/"]
+        assert colloc(words) in (0, 4)
     said = capsys.readouterr().out
     former = next(tmp_path.glob("mine*.former-1.h5"))
-    assert re.search(
-        rf"the former result, of another problem called mine, is kept as {former}\n", said
-    )
+    assert f"the former result, of another problem called mine, is kept as {former}\n" in said
     assert load(former).problem.delta == 2e-2
     assert former.with_suffix(".png").exists()

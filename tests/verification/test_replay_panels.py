@@ -94,18 +94,12 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
     for k in range(n):
         turn, move = twice[0].copy(), twice[1].copy()
         turn[k], move[k] = once[0][k], once[1][k]
-        change = abs(distance(turn, move) - distance(*twice[:2]))
-        assert changes(panels)[0][k, 1] == pytest.approx(
-            change, rel=3e-2 if steady else 1e-3, abs=1e-9
-        )
+        change, rel = abs(distance(turn, move) - distance(*twice[:2])), 3e-2 if steady else 1e-3
+        assert changes(panels)[0][k, 1] == pytest.approx(change, rel=rel, abs=1e-9)
 
 
-OPTIMA = {
-    row["number"]: row
-    for row in map(
-        json.loads, (ROOT / "results/curated/audit.jsonl").read_text(encoding="utf-8").splitlines()
-    )
-}
+AUDIT = (ROOT / "results/curated/audit.jsonl").read_text(encoding="utf-8")
+OPTIMA = {row["number"]: row for row in map(json.loads, AUDIT.splitlines())}
 
 
 @pytest.mark.parametrize("number", [35, 94, 162, 209, 558, 893])
