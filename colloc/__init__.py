@@ -47,6 +47,7 @@ _NAMES = {
     "gaits.serpenoid": "Serpenoid",
     "gaits.harmonic": "Harmonic Fourier ellipse",
     "gaits.regime": "Free",
+    "gaits.robot": "Robot",
     "gaits.bspline": "BSpline Corners Polygon",
     "gaits.columns": "Basis",
     "studies.solve": "solve multistart Starts",

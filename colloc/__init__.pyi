@@ -26,6 +26,7 @@ from colloc.laws.fitted_friction import (
 from colloc.gaits.serpenoid import Serpenoid as Serpenoid
 from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
 from colloc.gaits.regime import Free as Free
+from colloc.gaits.robot import Robot as Robot
 from colloc.gaits.bspline import BSpline as BSpline, Polygon as Polygon
 from colloc.gaits.columns import Basis as Basis
 from colloc.gaits.bspline import Corners as Corners

@@ -123,8 +123,10 @@ def multistart(options: argparse.Namespace) -> int:
     # slow imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
     from colloc.results.archive import open_archive, save_archive
+    from colloc.search.explore import with_reachable_distance
     from colloc.studies.solve import run_starts
 
+    problem = with_reachable_distance(problem)
     archive = open_archive(problem, path)  # or refused, before anything is solved
     search = options.sampler, options.seed, options.starts
     done = archive.done(*search, retry=options.retry)

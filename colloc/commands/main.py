@@ -199,9 +199,11 @@ PROBLEM = (
     *CHANGES,
 )
 """The problem file, and the changes to it that every solving command takes."""
-LENGTH = option(float, "--length", "M", "of the stretched robot [m]")
-MASS = option(float, "--mass", "KG", "of the robot [kg]")
-ROBOT = (LENGTH, MASS, option(float, "--gravity", "G", "default: 9.81 m/s^2", 9.81))
+ROBOT = (
+    option(float, "--length", "M", "of the stretched robot [m] (default: the problem's)"),
+    option(float, "--mass", "KG", "of the robot [kg] (default: the problem's)"),
+    option(float, "--gravity", "G", "default: the problem's, or 9.81 m/s^2"),
+)
 PERIOD = option(float, "--period", "S", "seconds per period")
 MAX_SPEED = option(float, "--max-speed", "V", "of the joints [rad/s], one or one each", nargs="+")
 MAX_TORQUE = option(float, "--max-torque", "M", "of the joints [N m], one or one each", nargs="+")
@@ -244,14 +246,6 @@ def read_problem(
         return stated, problem.with_(guess=gait)
     except ProblemError as error:
         raise ProblemError(f"the gait of {start} cannot be the guess: {error}") from None
-
-
-def robot_size(options: argparse.Namespace) -> dict[str, float]:
-    """Values of `ROBOT` by name; none without length and mass."""
-    missing = [name for name in ("length", "mass") if getattr(options, name) is None]
-    if len(missing) == 1:
-        raise ProblemError(f"a robot needs --length and --mass; --{missing[0]} is missing.")
-    return {} if missing else values(options, "length", "mass", "gravity")
 
 
 def values(options: argparse.Namespace, *names: str) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.checks import Certificate
 from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE, distance, fourier_series
-from colloc.results.robot import Robot
+from colloc.results.robot import RobotSheet, stated_robot
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.search.certify import certify
@@ -27,7 +27,7 @@ _TOLERANCE = 1e-6
 # largest difference of numbers over the sum of their errors, and ratio of these (measured: 2.2, 8)
 _AGREEMENT, _SAME_SIZE = 3.0, 10.0
 _MOST_INSTANTS = 100_000
-_PACE = ("period", "max_speed", "max_torque")
+_ROBOT = ("length", "mass", "gravity", "period", "max_speed", "max_torque")
 _REPLAY = cli.option(
     float, "--tolerance", "TOL", "of the replayed efficiency, relative", _TOLERANCE
 )
@@ -235,11 +235,8 @@ def report(options: argparse.Namespace) -> int:
     solution = load(source)
     path = cli.output_path(options, source.with_suffix(".html"))
     reference = read_problem_file(options.problem).reference if options.problem else None
-    size, pace, robot = cli.robot_size(options), cli.values(options, *_PACE), None
-    if size or any(value is not None for value in pace.values()):
-        if not size or options.period is None:
-            raise ProblemError("the page of a robot needs --length, --mass and --period.")
-        robot = Robot(solution, **size, **pace)
+    stated = stated_robot(solution, **cli.values(options, *_ROBOT))
+    robot = RobotSheet(solution, **stated) if stated else None
     figures: list[str] = []
     with cli.status_line(options) as line:
         line.say("writing the page")
@@ -327,8 +324,8 @@ def export(options: argparse.Namespace) -> int:
     solution = load(source)
     options.format = "xml" if options.format == "mjcf" else options.format
     path = cli.output_path(options, source, ("csv", "json", "xml", "urdf"))
-    settings = cli.values(options, "period", "max_speed", "rate", "periods", "ramp")
-    facts = solution.export(path, **settings, **cli.robot_size(options)) | {"file": str(path)}
+    names = ("period", "max_speed", "rate", "periods", "ramp", "length", "mass", "gravity")
+    facts = solution.export(path, **cli.values(options, *names)) | {"file": str(path)}
     if path.suffix in (".xml", ".urdf"):
         lines = [
             f"saved {path}: a robot of {facts['length_m']:g} m and {facts['mass_kg']:g} kg; "
@@ -383,17 +380,14 @@ Numbers include inertia at the period that is given.
 
   colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --max-torque 2.5 2.0""",
     cli.RESULT,
-    *(
-        (name, settings | {"required": True})
-        for name, settings in (cli.LENGTH, cli.MASS, cli.PERIOD)
-    ),
-    *(cli.ROBOT[-1], cli.MAX_SPEED, cli.MAX_TORQUE),
+    *cli.ROBOT,
+    *(cli.PERIOD, cli.MAX_SPEED, cli.MAX_TORQUE),
     cli.flag("--figure", "also draw torque, speed and power over time"),
     cli.output("folder or .png file of the figure (default: beside the result)"),
 )
 def robot(options: argparse.Namespace) -> int:
     source = Path(options.result)
-    sheet = Robot(load(source), **cli.robot_size(options), **cli.values(options, *_PACE))
+    sheet = load(source).robot(**cli.values(options, *_ROBOT))
     facts, lines = dict(sheet.facts), sheet.lines()
     if options.figure or options.output:
         path = cli.output_path(options, source.with_suffix(".robot.png"))

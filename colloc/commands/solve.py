@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from colloc.commands import main as cli
 from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, naming_saved_files
@@ -19,10 +19,13 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, read_problem_file
 from colloc.gaits.regime import Free
+from colloc.gaits.robot import Robot
 from colloc.mechanics.chain import Chain
 from colloc.results import limit_use
 from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED
+from colloc.results.checks import BACKLASH
 from colloc.results.kept import Saved, save_result
+from colloc.results.robot import in_si
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 from colloc.system.progress import duration
@@ -30,6 +33,7 @@ from colloc.system.progress import duration
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
 
+_ROLLING = 0.02  # coefficient of friction of a wheel along
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
 _MANY_INTERVALS, _SECONDS_PER_INTERVAL = 1000, 0.02
 EXIT = {
@@ -49,9 +53,19 @@ _FLOOR = {
     # in units of the weight
     body=Chain(
         {lengths},
-        feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range({links})),
+        feet=tuple(Wheel(link, rolling={rolling:g}, sideways={mu:g}) for link in range({links})),
     ),""",
 }
+_SIZE = """\
+    # distance that a gait must go in a period, in body lengths; where the farthest gait goes less,
+    # half of what it goes. Without it the most efficient gait may be one that hardly moves
+    least_distance=0.1,
+"""
+_ROBOT = """\
+    # the robot in SI units: metres, kilograms, seconds, rad/s, N m, W, rad. Its inertia, its limits
+    # and the objective follow, the least energy of the battery per metre
+    robot=Robot({robot}),
+"""
 _TEMPLATE = '''\
 """{links} links: change what is yours, then `colloc solve {file}`."""
 
@@ -63,78 +77,172 @@ PROBLEM = Problem(
 {floor}
     # what sliding sideways, forwards and backwards costs, in units of the weight;
     # friction does not depend on speed
-    friction=Friction(mu_t=1.0, mu_f=1.0, mu_b=1.0),
+    friction=Friction(mu_t={mu:g}, mu_f={mu:g}, mu_b={mu:g}),
     # the class of gaits to search, which decides the answer: more harmonics allow finer motions.
     # "bilateral": the body run backwards in time looks the same from its head; it never turns,
-    # and half a period is enough. It needs lengths that read the same from both ends.
+    # and half a period is enough. It needs lengths that read the same from both ends, and a robot
+    # whose inertia does not count.
     # Others: "antipodal" (the second half mirrors the first), "none"
     gait=Harmonic(harmonics=2, symmetry="{symmetry}"),
     # the largest angle of a joint [rad], at most pi. In degrees: `from math import radians`
     # above, and radians(100) here
-    joint_limit=3.14,
-    # No guess is needed: travelling waves, known gaits and random ones are tried.
+    joint_limit={joint_limit:.6g},
+{robot}    # No guess is needed: travelling waves, known gaits and random ones are tried.
     # guess=Fourier(mean, cos, sin) adds yours.
 )
 '''
+_STATED = ("length", "mass", "period", "max_speed", "max_torque", "idle_power", "backlash")
+
+
+def _in_units(**units: float) -> Callable[[str], float]:
+    """Reader of a number that may end in one of these units; without one it is in the first."""
+
+    def read(text: str) -> float:
+        number, unit = re.fullmatch(r"\s*([-+.\deE]*[\d.])\s*([a-z/]*)\s*", text).groups()  # type: ignore[union-attr]
+        return float(number) * (units[unit] if unit else 1.0)
+
+    def checked(text: str) -> float:
+        try:
+            return read(text)
+        except (AttributeError, KeyError):
+            raise ValueError(text) from None
+
+    return checked
 
 
 @cli.command(
     """\
-The file runs as it is; one that is there already is left alone. Take --links or --lengths, --feet
-or --wheels.
+The file runs as it is; one that is there already is left alone. A robot of --length, --mass and
+--period is stated in SI units; without these the body is 1 long. Numbers may end in their units:
+62cm, 900g, 85deg.
 
   colloc init mine.py --links 4 --feet 1
-  colloc init mine.py --lengths 22 30 30 22 --wheels
+  colloc init mine.py --links 22 30 30 22 --wheels
+  colloc init mine.py --links 22 30 30 22 --wheels --mu 0.3 --joint-limit 85deg \\
+      --length 0.62 --mass 0.9 --period 2.5 --max-speed 5 --max-torque 1.2 --idle-power 2
   colloc solve mine.py""",
     cli.option(Path, "problem", "FILE.py", "the file to write"),
-    cli.option(int, "--links", "N", f"equal links (default: {_FEWEST})"),
-    cli.option(float, "--lengths", "L", "of the links, tail to head, in any unit", nargs="+"),
+    cli.option(
+        float,
+        "--links",
+        "N",
+        f"equal links (default: {_FEWEST}); or their lengths, tail to head, in any unit",
+        nargs="+",
+    ),
+    cli.option(float, "--lengths", "L", "of the links, as with --links", nargs="+"),
     cli.option(int, "--feet", "N", "feet on each link (default: none, links lie flat)"),
     cli.flag("--wheels", "a wheel in the middle of each link"),
+    cli.option(float, "--mu", "MU", "coefficient of friction (default: 1)", 1.0, least=0),
+    cli.option(
+        _in_units(rad=1.0, deg=math.pi / 180),
+        "--joint-limit",
+        "ANGLE",
+        "largest angle of a joint [rad] (default: 3.14)",
+        3.14,
+        least=0,
+    ),
+    cli.option(
+        _in_units(m=1.0, cm=0.01, mm=0.001), "--length", "M", "of the stretched robot", least=0
+    ),
+    cli.option(_in_units(kg=1.0, g=0.001), "--mass", "KG", "of the robot", least=0),
+    cli.option(
+        _in_units(s=1.0, ms=0.001),
+        "--period",
+        "S",
+        "seconds per cycle; or the shortest and the longest, between which it is sought",
+        nargs="+",
+        least=0,
+    ),
+    cli.option(
+        _in_units(**{"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30}),
+        "--max-speed",
+        "V",
+        "of the joints [rad/s]",
+        least=0,
+    ),
+    cli.option(float, "--max-torque", "M", "of the joints [N m]", least=0),
+    cli.option(float, "--idle-power", "P", "that electronics draw [W]", least=0),
+    cli.option(
+        _in_units(rad=1.0, deg=math.pi / 180), "--backlash", "ANGLE", "of a joint [rad]", least=0
+    ),
 )
 def init(options: argparse.Namespace) -> int:
     path: Path = options.problem
     for one, other in (("links", "lengths"), ("feet", "wheels")):
         if getattr(options, one) is not None and getattr(options, other):
             raise ProblemError(f"--{one} and --{other} exclude each other; see colloc init --help.")
-    links = _FEWEST if options.links is None else options.links
-    lengths = options.lengths or [1.0] * min(links, _MOST + 1)
+    lengths = options.lengths or options.links or [float(_FEWEST)]
+    if options.lengths is None and len(lengths) == 1:
+        if not lengths[0].is_integer():
+            raise ProblemError(f"--links must be a whole number of links, not {lengths[0]:g}.")
+        lengths = [1.0] * max(0, min(int(lengths[0]), _MOST + 1))
     if not _FEWEST <= (links := len(lengths)) <= _MOST:
         more = " or more" * (links > _MOST)
         raise ProblemError(f"a chain must have {_FEWEST} to {_MOST} links here, not {links}{more}.")
     whole, largest = math.fsum(lengths), _LONGER * min(lengths)
     if not (math.isfinite(whole) and 0 < max(lengths) <= largest):
         raise ProblemError(
-            f"--lengths must be positive numbers, the longest at most {_LONGER:g} times the "
+            f"lengths of links must be positive numbers, the longest at most {_LONGER:g} times the "
             f"shortest, not {', '.join(f'{length:g}' for length in lengths)}."
         )
     if path.suffix != ".py":
         raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
-    feet = options.feet or 0
+    feet, robot = options.feet or 0, _stated_robot(options)
     # raises for a name that files cannot have
     Problem(path.stem, body=Chain(tuple(length / whole for length in lengths), feet=feet))
-    floor = _FLOOR["wheels" if options.wheels else "feet" if feet else ""].format(
+    floor = "wheels" if options.wheels else "feet" if feet else ""
+    floor = _FLOOR[floor].format(
         lengths=f"({', '.join(f'{length:.12g} / {whole:.12g}' for length in lengths)})",
         feet=feet,
         links=links,
+        mu=options.mu,
+        rolling=_ROLLING,
     )
+    arguments = ", ".join(f"{name}={value!r}" for name, value in robot.items())
+    size = _SIZE * ("idle_power" not in robot)
+    smallest = min(options.mu, _ROLLING) if options.wheels else options.mu
+    has_inertia = bool(robot) and Robot(**robot).derived(0.0, smallest)["froude"] != 0
     content = _TEMPLATE.format(
         links=links,
         file=path.name,
         name=path.stem,
-        names=f"Chain, Friction, Harmonic, Problem{', Wheel' * options.wheels}",
+        names=f"Chain, Friction, Harmonic, Problem{', Robot' * bool(robot)}"
+        f"{', Wheel' * options.wheels}",
         floor=floor,
-        symmetry="bilateral" if lengths == lengths[::-1] else "none",
+        mu=options.mu,
+        joint_limit=options.joint_limit,
+        robot=_ROBOT.format(robot=arguments) * bool(robot) + size,
+        symmetry="bilateral" if lengths == lengths[::-1] and not has_inertia else "none",
     )
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(content)
     except FileExistsError:
         raise ProblemError(f"{path} is there already; choose another name.") from None
-    read_problem_file(path)
+    try:
+        read_problem_file(path)
+    except ProblemError:
+        path.unlink()
+        raise
     line = f"wrote {path}: a problem of {links} links. Change it, then: colloc solve {path}"
     cli.tell(options, {"status": "written", "file": str(path), "links": links}, [line])
     return OK
+
+
+def _stated_robot(options: argparse.Namespace) -> dict[str, Any]:
+    """Arguments of a `Robot`; none if no option speaks of it."""
+    robot = {name: x for name in _STATED if (x := getattr(options, name)) is not None}
+    if not robot:
+        return {}
+    if missing := [f"--{name}" for name in _STATED[:3] if name not in robot]:
+        raise ProblemError(
+            f"a robot in SI units needs --length, --mass and --period; {' and '.join(missing)} "
+            f"{'is' if len(missing) == 1 else 'are'} missing."
+        )
+    period = robot["period"]
+    robot["period"] = period[0] if len(period) == 1 else tuple(period)
+    Robot(**robot)
+    return robot
 
 
 def save_and_tell(options: argparse.Namespace, solution: Solution, path: Path) -> int:
@@ -156,6 +264,10 @@ def summary_lines(
         return [verdict, *lines]
     if solution.answer.program not in (PRESCRIBED, EVALUATED):
         verdict += f" ({solution.standing[0]})"
+    if any(check.name == BACKLASH for check in solution.certificate.failures):
+        verdict += ": too small for this robot"
+    elif solution.is_tiny:
+        verdict += ": a tiny gait"
     rows = [*_quantities(solution), *(_background(solution) if verbose else [])]
     table = [f"  {name:<15s} {text}" for name, text in rows]
     if reference is not None:
@@ -178,7 +290,7 @@ def _quantities(solution: Solution) -> list[tuple[str, str]]:
         f"points; {period.value_at_zero_delta:.6f} +- {period.value_error_at_zero_delta:.0e} for "
         f"delta -> 0"
     )
-    rows = [(problem.objective.label, text)]
+    rows = [*_in_si(solution), (problem.objective.label, text)]
     if problem.objective != EFFICIENCY:
         text = f"{period.efficiency:.6f} +- {period.efficiency_error:.0e}"
         rows.append((EFFICIENCY.label, text))
@@ -208,7 +320,33 @@ def _quantities(solution: Solution) -> list[tuple[str, str]]:
         f"{getattr(period, name):.6f} +- {period.errors[name]:.0e}" for name in ("distance", "work")
     )
     text = f"{distance}      work W  {work}      at delta {solution.answer.delta:.0e}"
-    return [*rows, ("distance d", text)]
+    rows.append(("distance d", text))
+    if isinstance(problem.body, Chain) and problem.gait.free:
+        degrees = ", ".join(f"{math.degrees(swing):.0f}" for swing in solution.swings)
+        what = "joints move" if problem.joint_map is None else "motors turn"
+        way = f"the body by {period.distance:.3g} of its length"
+        rows.append(("motion", f"{what} by {degrees} degrees (tail to head), {way}"))
+    return rows
+
+
+def _in_si(solution: Solution) -> list[tuple[str, str]]:
+    """Speed and energy of the problem's robot."""
+    if not (f := in_si(solution)):
+        return []
+    way, time = f["distance_per_cycle_m"], f["period_s"]
+    rows = [
+        ("speed", f"{100 * way / time:.4g} cm/s: {100 * way:.4g} cm in a cycle of {time:.4g} s")
+    ]
+    if "energy_J_per_m" in f:
+        motors, idle = f["motor_work_per_cycle_J"], f["idle_energy_per_cycle_J"]
+        rows.append(
+            (
+                "energy",
+                f"{f['energy_J_per_m']:.4g} J/m; a cycle takes {motors:.3g} J of the motors and "
+                f"{idle:.3g} J of the electronics",
+            )
+        )
+    return rows
 
 
 def _background(solution: Solution) -> list[tuple[str, str]]:
@@ -258,6 +396,9 @@ def summary_dict(
         "starts": solution.starts,
         "shrunk": None if solution.shrunk is None else solution.shrunk.value,
         "limits": limit_use.shares(solution) if replayed else {},
+        "robot": in_si(solution),
+        "swings_rad": solution.swings.tolist() if problem.gait.free else [],
+        "tiny": solution.is_tiny,
         "feet_hold": solution.share_held.tolist() if replayed else [],
         "others": [{name: getattr(each, name) for name in other} for each in solution.others],
         "gait": fields(solution.gait),

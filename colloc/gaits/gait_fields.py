@@ -16,6 +16,7 @@ from colloc.gaits.coupled import Coupled
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.linear import Combination
 from colloc.gaits.prescribed import Phases, Prescribed
+from colloc.gaits.robot import Robot
 from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.resistance import Elliptic, PowerLaw, Viscous
@@ -113,16 +114,20 @@ def problem_fields(problem: Any) -> dict[str, Any]:
     }
     if problem.motion is not None:
         plain["motion"] = fields(problem.motion)
+    if problem.robot is not None:
+        plain["robot"] = fields(problem.robot)
     return {
         f.name: plain.get(f.name, value)
         for f in dataclasses.fields(problem)
-        if (value := getattr(problem, f.name)) != f.default or f.metadata != STATED_IF_SET
+        if f.name not in problem.derived
+        and ((value := getattr(problem, f.name)) != f.default or f.metadata != STATED_IF_SET)
     }
 
 
 def problem_arguments(stated: dict[str, Any]) -> dict[str, Any]:
     kinds = {"guess": GAITS, "body": BODIES, "friction": [*LAWS, FeetLaw], "gait": CLASSES}
     kinds |= {"motion": MOTIONS} if "motion" in stated else {}
+    kinds |= {"robot": [Robot]} if "robot" in stated else {}
     return stated | {name: part_from(kind, stated[name]) for name, kind in kinds.items()}
 
 

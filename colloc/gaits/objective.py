@@ -217,6 +217,7 @@ driven backwards in "driven efficiency". For viscous drag, whose work grows with
 is Lighthill's efficiency: the work of towing the straight body as far in the same time, at unit
 drag along it, per work."""
 _SHORT = {
+    "battery efficiency": "d/E",
     "efficiency": "d/W",
     "speed": "d/L",
     "turning": "θ/W",

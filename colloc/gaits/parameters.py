@@ -51,6 +51,7 @@ class Parameter:
 
 def parameters(problem: Problem) -> list[Parameter]:
     """The numbers of a problem that a sensitivity is asked for."""
+    problem = problem.without_robot
     chain = problem.body if isinstance(problem.body, Chain) else None
     numbers = []
 

@@ -17,6 +17,7 @@ from colloc.gaits.linear import LinearClass
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.regime import LEVEL, Free, Regime, regime_of
+from colloc.gaits.robot import DERIVED, Robot
 from colloc.gaits.starts import check_guess, default_guess
 from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, fraction
 from colloc.mechanics.bodies import FULL, Body
@@ -126,6 +127,12 @@ class Problem:
         where the objective speaks of the "period" [sqrt(length / gravity)].
     motion : Regime, optional
         A kind of motion of your own, instead of `grade` and `froude` (`colloc.gaits.regime`).
+    robot : Robot, optional
+        The robot in SI units. Its pace, motors and electronics say `froude`, `speed_limit`,
+        `torque_limit` and, where none is stated, the objective: least energy per metre.
+    least_distance : float, optional
+        Distance that a gait must go in a period [body lengths], or half of what the farthest one
+        goes, if that is less than this.
     shrinking : bool
         Whether a gait may be the answer that shrank until nobody sees it move. By default the best
         gait of finite size is, if there is one.
@@ -158,7 +165,7 @@ class Problem:
     scheme: str = "gauss-3"
     formulation: str = None  # type: ignore[assignment]
     mesh_tolerance: float = 3e-5
-    objective: Objective = field(default=EFFICIENCY, metadata=STATED_IF_SET)
+    objective: Objective = field(default=None, metadata=STATED_IF_SET)  # type: ignore[assignment]
     rotation: float | None = field(default=0.0, metadata=STATED_IF_SET)
     at_least: tuple[tuple[Objective, float], ...] = field(default=(), metadata=STATED_IF_SET)
     torque_limit: Limit | None = field(default=None, metadata=STATED_IF_SET)
@@ -169,6 +176,8 @@ class Problem:
     towards: float | None = field(default=None, metadata=STATED_IF_SET)
     froude: float | Free = field(default=0.0, metadata=STATED_IF_SET)
     motion: Regime | None = field(default=None, metadata=STATED_IF_SET)
+    robot: Robot | None = field(default=None, metadata=STATED_IF_SET)
+    least_distance: float | None = field(default=None, metadata=STATED_IF_SET)
     shrinking: bool = field(default=False, metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
@@ -193,6 +202,7 @@ class Problem:
             what = "a prescribed motion has no class of gaits"
             what = what if self.gait.free else "this body's motion is not prescribed"
             raise ProblemError(f"{what}; leave gait out, or take another body.")
+        self._derive()
         self._set(objective=objective_from(self.objective), at_least=least_values(self.at_least))
         regime, froude = self.regime, self.froude
         start = regime.delta_start(self.gait) or usual.delta_start
@@ -230,6 +240,30 @@ class Problem:
     def _set(self, **values: object) -> None:
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def _derive(self) -> None:
+        """Set what follows from the robot."""
+        if self.robot is None:
+            self._fill(objective=EFFICIENCY)
+            return
+        check_kind("robot", self.robot, [Robot])
+        for name in DERIVED:
+            if getattr(self, name) != getattr(type(self), name):
+                raise ProblemError(
+                    f"{name} follows from the robot, in SI units: leave it out, or the robot."
+                )
+        derived = self.robot.derived(self.grade, self.law.smallest)
+        self._fill(objective=derived.pop("objective"))
+        self._set(**derived)
+
+    @property
+    def derived(self) -> set[str]:
+        """Names of the fields that follow from others."""
+        usual, names = EFFICIENCY, set[str]()
+        if self.robot is not None:
+            usual = self.robot.derived(self.grade, self.law.smallest)["objective"]
+            names |= {*DERIVED}
+        return names | {"objective"} if self.objective == usual else names
 
     def _fill(self, **defaults: object) -> None:
         self._set(**{name: x for name, x in defaults.items() if getattr(self, name) is None})
@@ -282,6 +316,9 @@ class Problem:
                 "what is asked for speaks of the period: state the pace, froude=0.05 or "
                 "froude=Free(0.001, 1)."
             )
+        least = self.least_distance
+        if least is not None and not (is_number(least) and least > 0):
+            raise ProblemError(f"least_distance must be a positive number, not {least!r}.")
         if self.rotation is not None and not is_number(self.rotation):
             raise ProblemError(f"rotation must be a finite number or None, not {self.rotation!r}.")
         if self.rotation == 0 and self.uses("rotation"):
@@ -295,6 +332,7 @@ class Problem:
                 f"without symmetry."
             )
         asked = self.objective != EFFICIENCY or self.at_least or self.speed_limit is not None
+        asked = asked or self.least_distance is not None
         if asked and not self.gait.free:
             raise ProblemError(
                 "nothing is free in a prescribed motion; leave objective, at_least and "
@@ -480,7 +518,16 @@ class Problem:
 
     def with_(self, **changes: object) -> Problem:
         """A copy with some fields changed, validated anew."""
-        return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
+        stated = {name: getattr(type(self), name) for name in self.derived} | changes
+        return dataclasses.replace(self, **stated)
+
+    @property
+    def without_robot(self) -> Problem:
+        """The same problem, in which the numbers that follow from the robot are stated."""
+        if self.robot is None:
+            return self
+        values = {name: getattr(self, name) for name in ("objective", *DERIVED)}
+        return self.with_(robot=None, **values)
 
     def to_dict(self) -> dict:
         """All fields as plain numbers, strings and lists (JSON)."""

@@ -38,7 +38,13 @@ from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.pictures import render
 from colloc.results.motion import RigidMotion
-from colloc.results.robot import Robot, joint_torques, pressing, quasi_static_torques
+from colloc.results.robot import (
+    RobotSheet,
+    joint_torques,
+    pressing,
+    quasi_static_torques,
+    stated_robot,
+)
 from colloc.results.solution import Solution
 from colloc.system.arguments import check_count, checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -79,7 +85,7 @@ def write_export(
     ramp: bool = True,
     length: float | None = None,
     mass: float | None = None,
-    gravity: float = GRAVITY,
+    gravity: float | None = None,
 ) -> dict[str, Any]:
     """Write joint angles (or amplitudes of modes) and their speeds at equal steps of time.
 
@@ -100,9 +106,10 @@ def write_export(
     ramp : bool
         Lead from the straight body, at rest, into the gait at times below 0.
     length, mass : float, optional
-        Of the robot [m], [kg], to write torques [N m] and powers [W], too.
-    gravity : float
-        [m/s^2]
+        Of the robot [m], [kg], to write torques [N m] and powers [W], too. These, and the period
+        without `max_speed`, are by default those of the problem's robot.
+    gravity : float, optional
+        [m/s^2], by default that of the problem's robot, or 9.81.
 
     Returns
     -------
@@ -122,6 +129,11 @@ def write_export(
         raise ProblemError(
             f"{problem.name} is a prescribed motion of a smooth body: it has no joints to export."
         )
+    if problem.robot is not None:
+        stated = stated_robot(solution, length=length, mass=mass, period=period, gravity=gravity)
+        length, mass, gravity = (stated[name] for name in ("length", "mass", "gravity"))
+        period = period if max_speed is not None else stated["period"]
+    gravity = GRAVITY if gravity is None else gravity
     if path.suffix in MODELS:
         if period is None or length is None or mass is None:
             raise ProblemError(
@@ -133,7 +145,7 @@ def write_export(
                 "a model for simulators holds no motion: leave max_speed out, and write the angles "
                 "as CSV."
             )
-        return _write_model(Robot(solution, length, mass, period, gravity), path)
+        return _write_model(RobotSheet(solution, length, mass, period, gravity), path)
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
     gait, paced_by, froude = solution.gait.motor_gait, problem.paced_by, solution.froude
     trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=bool(paced_by))
@@ -188,7 +200,7 @@ def write_export(
         if length is None or mass is None:
             raise ProblemError("torques need both the length and the mass of the robot.")
         # the period that was requested: that of whole samples may be another pace
-        robot = Robot(solution, length, mass, period or trajectory.period, gravity)
+        robot = RobotSheet(solution, length, mass, period or trajectory.period, gravity)
         facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
         if limits is None or paced_by:
             at_pace, torques = robot, robot.torques(trajectory.phase)
@@ -235,7 +247,11 @@ def write_export(
 
 
 def _end(
-    solution: Solution, trajectory: Trajectory, way: Approach, periods: int, robot: Robot | None
+    solution: Solution,
+    trajectory: Trajectory,
+    way: Approach,
+    periods: int,
+    robot: RobotSheet | None,
 ) -> dict[str, Any]:
     """Displacement of the centre of mass and turn of the tail link from the straight body along +x
     over a way into the gait to the end, with inertia if the pace is known."""
@@ -287,7 +303,7 @@ def _end(
     }
 
 
-def _write_model(robot: Robot, path: Path) -> dict[str, Any]:
+def _write_model(robot: RobotSheet, path: Path) -> dict[str, Any]:
     write_text(path, MODELS[path.suffix](robot))
     solution, problem = robot.solution, robot.solution.problem
     names = ("name", "status", "peak_torque_N_m", "peak_speed_rad_per_s")
@@ -323,7 +339,7 @@ def _write_model(robot: Robot, path: Path) -> dict[str, Any]:
     return facts | ({"note": note} if note else {})
 
 
-def _links(robot: Robot) -> dict[str, Any]:
+def _links(robot: RobotSheet) -> dict[str, Any]:
     """Links and joints in SI units; the inertia about a link's length is that of its box."""
     problem = robot.solution.problem
     chain, limit = problem.body, problem.joint_limit
@@ -348,7 +364,7 @@ def _links(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _xml(template: str, robot: Robot, /, **values: Any) -> str:
+def _xml(template: str, robot: RobotSheet, /, **values: Any) -> str:
     facts = robot.facts
     peaks = np.array(facts["peak_torque_N_m"]), np.array(facts["peak_speed_rad_per_s"])
     text = render(template, name=robot.solution.problem.name, robot=robot, peaks=peaks, **values)
@@ -357,7 +373,7 @@ def _xml(template: str, robot: Robot, /, **values: Any) -> str:
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def mjcf(robot: Robot, *, contacts: bool = True) -> str:
+def mjcf(robot: RobotSheet, *, contacts: bool = True) -> str:
     """The robot as MJCF with position servos and the keyframe "start"; without `contacts`, and
     under laws that are not dry, it touches no floor. `ProblemError` for other bodies than such
     chains."""
@@ -404,7 +420,7 @@ def mjcf(robot: Robot, *, contacts: bool = True) -> str:
     )
 
 
-def urdf(robot: Robot) -> str:
+def urdf(robot: RobotSheet) -> str:
     """The robot as a URDF; link_1 is its tail. Efforts and speeds are 1.5 times the gait's."""
     return _xml("robot.urdf", robot, parts=_links(robot), reserve=_RESERVE)
 

@@ -39,7 +39,7 @@ from colloc.system.errors import ProblemError
 from colloc.verification.mesh_error import mesh_error
 
 if TYPE_CHECKING:
-    from colloc.results.robot import Robot
+    from colloc.results.robot import RobotSheet
     from colloc.studies.families import ParetoFront, Steering
 
 COLUMN, PAGE = 3.4, 7.0  # widths of a column and of two in journals [inches]
@@ -477,7 +477,7 @@ def _draw_tracks(axes: Axes, family: Steering) -> None:
     axes.set(xlabel=what, ylabel="y  [body lengths]", aspect="equal")
 
 
-def robot_panels(robot: Robot) -> dict[str, Panel]:
+def robot_panels(robot: RobotSheet) -> dict[str, Panel]:
     def panel(what: str, unit: str) -> Panel:
         t, rows = robot.columns["t"].values, robot.columns[f"joint_{what}s"].values
         labels = {"xlabel": "time  [s],  one period", "ylabel": f"{what}  [{unit}]"}
@@ -486,7 +486,7 @@ def robot_panels(robot: Robot) -> dict[str, Panel]:
     return {what: panel(what, unit) for what, unit in _QUANTITIES.items()}
 
 
-def plot_robot(robot: Robot, ax: Axes | None = None, panel: str = "torque") -> Any:
+def plot_robot(robot: RobotSheet, ax: Axes | None = None, panel: str = "torque") -> Any:
     drawn = {name: each.draw for name, each in robot_panels(robot).items()}
     return _plot(drawn, ax, panel, (6.4, 6.4), stacked=True)
 

@@ -25,7 +25,7 @@ from colloc.pictures.figure import Panel, mesh_errors, panels, robot_panels
 from colloc.pictures.movie import Frames, frames
 from colloc.pictures.style import INK, styled
 from colloc.results.motion import foot_kinds, hinges
-from colloc.results.robot import SLOW_ENOUGH, Robot
+from colloc.results.robot import SLOW_ENOUGH, RobotSheet
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -51,7 +51,7 @@ def report_page(
     reference: Reference | None = None,
     gap: str = "",
     *,
-    robot: Robot | None = None,
+    robot: RobotSheet | None = None,
 ) -> str:
     """The page with what exists; `gap` is a sentence about the upper bound, `robot` a section."""
     problem, certificate = solution.problem, solution.certificate
@@ -114,7 +114,7 @@ def write_report(
     reference: Reference | None = None,
     known: Path | None = None,
     *,
-    robot: Robot | None = None,
+    robot: RobotSheet | None = None,
 ) -> Path:
     """Write the page; `known` is the folder of upper bounds, by default that of the page."""
     gap = ""

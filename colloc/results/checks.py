@@ -10,6 +10,9 @@ import numpy as np
 from colloc.gaits.objective import QUANTITIES
 from colloc.gaits.period import Period
 
+BACKLASH = "backlash"
+"""Name of the check that fails for a gait too small for the problem's robot."""
+
 
 @dataclass(frozen=True)
 class Check:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,11 +20,31 @@ from colloc.results.solution import Solution
 
 _INSTANTS = np.arange(2000) / 2000
 _BINDS, _MARGIN = 0.99, 1.01  # share of a limit at which it binds; of a bound at which it cannot
-UNITS = {
-    "joint speed": ("speed_limit", "rad per period"),
-    "torque": ("torque_limit", "weight x body length"),
-    "power": ("power_limit", "weight x body length per period"),
-}
+_FIELDS = {"joint speed": "speed_limit", "torque": "torque_limit", "power": "power_limit"}
+
+
+class _Unit(NamedTuple):
+    name: str  # of the limit as it was stated
+    text: str
+    size: float = 1.0  # of the problem's unit
+
+
+def _units(problem: Problem) -> dict[str, _Unit]:
+    """Units of limits by the field of the problem; in SI units those of a robot."""
+    units = {
+        "speed_limit": _Unit("speed_limit", "rad per period"),
+        "torque_limit": _Unit("torque_limit", "weight x body length"),
+        "power_limit": _Unit("power_limit", "weight x body length per period"),
+    }
+    if (robot := problem.robot) is not None:
+        for field, stated, text in (
+            ("speed_limit", "max_speed", "rad/s"),
+            ("torque_limit", "max_torque", "N m"),
+        ):
+            if (limit := getattr(robot, stated)) is not None:
+                size = np.ravel(limit)[0] / np.ravel(getattr(problem, field))[0]
+                units[field] = _Unit(stated, text, float(size))
+    return units
 
 
 def shares(solution: Solution) -> dict[str, float]:
@@ -54,12 +75,12 @@ def shares(solution: Solution) -> dict[str, float]:
 
 def lines(solution: Solution) -> list[str]:
     """Utilisations in a line, and a line for each limit that seems to be in other units."""
-    used, texts = shares(solution), []
+    used, texts, units = shares(solution), [], _units(solution.problem)
     for name, share in used.items():
         text = f"{name} {100 * share:.{0 if share >= 0.01 else 2}f} %"
-        field, unit = UNITS.get(name, ("", ""))
+        field = _FIELDS.get(name, "")
         if field and not isinstance(limit := getattr(solution.problem, field), tuple):
-            text += f" of {limit:g} {unit}"
+            text += f" of {limit * units[field].size:g} {units[field].text}"
         texts.append(text)
     if not used:
         return []
@@ -81,7 +102,8 @@ def _hints(problem: Problem, speed_used: float) -> Iterator[str]:
     if isinstance(gait, Harmonic) and problem.body.bounded_angles.rows.shape == (n, n):
         speed = 2 * math.pi * gait.harmonics * half
     power = torque * np.minimum(speed, problem.largest_speeds or np.inf)
-    for (field, unit), bound in zip(UNITS.values(), (speed, torque, power), strict=True):
+    units = _units(problem)
+    for (field, unit), bound in zip(units.items(), (speed, torque, power), strict=True):
         limit = getattr(problem, field)
         if not isinstance(limit, tuple):  # of all joints: it matters if it does to one of them
             bound = bound.max(keepdims=True)
@@ -90,15 +112,16 @@ def _hints(problem: Problem, speed_used: float) -> Iterator[str]:
             joint = int(np.argmax(stated / bound))
             of = f" of joint {joint + 1}" * isinstance(limit, tuple)
             yield (
-                f"{field} {stated[joint]:g}{of} cannot matter: no gait needs more than "
-                f"{bound[joint]:.3g} {unit}, its unit"
+                f"{unit.name} {unit.size * stated[joint]:g}{of} cannot matter: no gait needs more "
+                f"than {unit.size * bound[joint]:.3g} {unit.text}, its unit"
             )
     if speed_used > _BINDS:
         most = np.array(problem.largest_speeds) / 2
         joint = int(np.argmin(most / half))
         if most[joint] < 2 * half[joint]:
             swing, largest = np.degrees([most[joint], 2 * half[joint]])
+            unit = units["speed_limit"]
             yield (
-                f"speed_limit {2 * most[joint]:g} rad per period, its unit, lets a joint swing by "
-                f"{swing:.3g} of {largest:.3g} degrees at most"
+                f"{unit.name} {2 * unit.size * most[joint]:g} {unit.text}, its unit, lets a joint "
+                f"swing by {swing:.3g} of {largest:.3g} degrees at most"
             )

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colloc.dynamics.chain import joint_torques as inertial_torques
+from colloc.gaits.robot import check_size
 from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
@@ -23,7 +24,6 @@ from colloc.mechanics.inertia import GRAVITY, checked_mass, momenta, tail_veloci
 from colloc.mechanics.law import rate_independent
 from colloc.results.motion import Column, SampledMotion, arc, motion_dataset, rotate
 from colloc.results.solution import Solution, direction_of_travel
-from colloc.system.arguments import is_number, shown
 from colloc.system.environment import higher
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.trajectory import one_each, shortest_period
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 SLOW_ENOUGH = 0.01  # share of the efficiency that inertia may take from a quasi-static gait
 _SAME_PACE = 0.01  # relative difference of Froude numbers that counts as none
 _ACCURACY = 1e-6  # of the momenta with inertia
-_LARGEST = 1e9  # of metres, kilograms and seconds; the smallest is its inverse
 _INSTANTS, _A_SIDE = 2000, 8  # samples of a period, and of a side of a polygon, at least
 _UNKNOWN = ProblemError, NotConvergedError
 
@@ -123,8 +122,55 @@ def pressing(solution: Solution, gravity: float) -> float:
     return gravity * math.cos(math.atan(solution.problem.grade))
 
 
+def stated_robot(solution: Solution, **given: Any) -> dict[str, Any]:
+    """Arguments of `RobotSheet` that are given, the others as the problem's robot has them; empty
+    if there are none."""
+    stated, robot = {}, solution.problem.robot
+    if robot is not None:
+        names = ("length", "mass", "period", "gravity", "max_speed", "max_torque")
+        stated = {name: getattr(robot, name) for name in names} | {"period": period_of(solution)}
+    stated |= {name: value for name, value in given.items() if value is not None}
+    missing = [name for name in ("length", "mass", "period") if name not in stated]
+    if stated and missing:
+        raise ProblemError(f"a robot needs its length, mass and period; {missing[0]} is missing.")
+    return stated
+
+
+def period_of(solution: Solution) -> float:
+    """Time that a cycle of the problem's robot takes [s]."""
+    robot: Any = solution.problem.robot
+    if isinstance(robot.period, tuple):
+        return math.sqrt(robot.length / (pressing(solution, robot.gravity) * solution.froude))
+    return float(robot.period)
+
+
+def in_si(solution: Solution) -> dict[str, float]:
+    """Speed, way and energy of the problem's robot, by names that end in their units; empty without
+    a robot."""
+    robot, period = solution.problem.robot, solution.certificate
+    if robot is None or not period.replayed:
+        return {}
+    time, way = period_of(solution), period.distance * robot.length
+    unit = robot.mass * pressing(solution, robot.gravity) * robot.length
+    facts = {
+        "period_s": time,
+        "distance_per_cycle_m": way,
+        "speed_m_per_s": way / time,
+        "friction_work_per_cycle_J": unit * period.work,
+    }
+    if "driven_work" in period.values:
+        motors, idle = unit * period.values["driven_work"], robot.idle_power * time
+        facts |= {
+            "motor_work_per_cycle_J": motors,
+            "idle_energy_per_cycle_J": idle,
+            "energy_J_per_m": (motors + idle) / way,
+            "mean_battery_power_W": (motors + idle) / time,
+        }
+    return facts
+
+
 @dataclass(frozen=True, eq=False)
-class Robot:
+class RobotSheet:
     """A gait on a robot, made by `colloc.Solution.robot`; ``print`` shows its data sheet.
 
     In SI units; `max_speed` and `max_torque` are limits of the motors, one or one each.
@@ -141,11 +187,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         for name in ("length", "mass", "period", "gravity"):
-            if not (is_number(value := getattr(self, name)) and 1 / _LARGEST <= value <= _LARGEST):
-                raise ProblemError(
-                    f"{name} must be a number from {1 / _LARGEST:g} to {_LARGEST:g} in SI units, "
-                    f"not {shown(value)}."
-                )
+            check_size(name, getattr(self, name))
         problem, froude = self.solution.problem, self.solution.froude
         if froude and abs(self.froude / froude - 1.0) > _SAME_PACE:
             needed = math.sqrt(self.length / (self.pressing * froude))
@@ -158,7 +200,8 @@ class Robot:
             if (limit := getattr(self, name)) is not None:
                 each = one_each(limit, problem.n_motor, f"joint {what} limit")
                 object.__setattr__(self, name, each)
-                if problem.froude or not rate_independent(problem.law):
+                paced = problem.froude or not rate_independent(problem.law)
+                if paced and problem.robot is None:
                     raise ProblemError(
                         f"{name} asks for another pace, and torques depend on it, as "
                         f"{problem.paced_by}: leave it out, or solve again for that pace."
@@ -269,7 +312,7 @@ class Robot:
                 if rate_independent(problem.law):
                     slow = self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH))
                     facts["slow_enough_period_s"] = math.sqrt(slow)
-        if self.max_speed is not None:
+        if self.max_speed is not None and not problem.froude:
             gait, limits = solution.gait.motor_gait, np.asarray(self.max_speed)
             shortest = shortest_period(gait, limits, keep_pace=True)
             facts |= {"max_speed_rad_per_s": limits.tolist(), "shortest_period_s": shortest}

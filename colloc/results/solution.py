@@ -16,6 +16,7 @@ from colloc.dynamics.slow_enough import slow_enough
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.inertia import checked_mass, tail_velocity
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
 from colloc.results.checks import UNCERTIFIED, Certificate
@@ -48,6 +49,7 @@ NOT_CONVERGED = "not converged"
 CERTIFICATE_FAILED = "certificate failed"
 INTERRUPTED = "interrupted"
 _INSTANTS = np.arange(2000) / 2000  # to count at
+_TINY_SWING, _TINY_DISTANCE = math.radians(8), 0.02
 
 
 @dataclass(eq=False)
@@ -306,6 +308,20 @@ class Solution:
         return self.holding(self.sample(_INSTANTS)).mean(axis=1)
 
     @property
+    def swings(self) -> np.ndarray:
+        """Angles between the ends of the movement of each motor [rad], ``(n_motor,)``."""
+        return np.asarray(np.ptp(self.gait.motor_gait.angles(_INSTANTS), axis=1))
+
+    @property
+    def is_tiny(self) -> bool:
+        """Whether hardly anybody would see the gait: all joints of a chain move by less than 8
+        degrees, or the body by less than a fiftieth of its length a period."""
+        if self.answer.program == PRESCRIBED:
+            return False
+        chain = isinstance(self.problem.body, Chain)
+        return bool((chain and self.swings.max() < _TINY_SWING) or self.distance < _TINY_DISTANCE)
+
+    @property
     def travels(self) -> str:
         """Average direction of travel: "head first", "tail first" or "sideways"."""
         motion = self.sample(_INSTANTS)
@@ -345,13 +361,24 @@ class Solution:
         `colloc.pictures.export.write_export`."""
         return higher("pictures.export:write_export")(self, Path(path), **options)
 
-    def robot(self, length: float, mass: float, period: float, **options: Any) -> Any:
-        """A `colloc.results.robot.Robot`: speed, power and torques of the gait on a robot of so
-        many metres and kilograms.
+    def robot(
+        self,
+        length: float | None = None,
+        mass: float | None = None,
+        period: float | None = None,
+        **options: Any,
+    ) -> Any:
+        """A `colloc.results.robot.RobotSheet`: speed, power and torques of the gait on a robot of
+        so many metres and kilograms; by default on the problem's robot.
 
         Options as there: `gravity`, `max_speed`, `max_torque`.
         """
-        return higher("results.robot:Robot")(self, length, mass, period, **options)
+        given = higher("results.robot:stated_robot")(
+            self, length=length, mass=mass, period=period, **options
+        )
+        if not given:
+            raise ProblemError("state the robot's length [m], mass [kg] and period [s].")
+        return higher("results.robot:RobotSheet")(self, **given)
 
     @checked_arguments
     def sensitivity(self, resolve: bool = False) -> Any:

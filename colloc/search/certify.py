@@ -12,7 +12,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import BALANCED, Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.results.answer import EVALUATED, Answer
-from colloc.results.checks import Certificate, Check
+from colloc.results.checks import BACKLASH, Certificate, Check
 from colloc.results.measured import astray, measure
 from colloc.search.options import TOLERANCES
 from colloc.verification.adaptive_motion import Path, Replay
@@ -189,6 +189,10 @@ def _rows(
         name = f"{'motor' if joints else usual.coordinate} {int(share.argmax()) + 1}"
         meaning = f"excess over a limit, relative; nearest to its own: {name}"
         yield "joint speed", max(float(share.max()) - 1.0, 0.0), at.replay_gap, meaning
+    if problem.robot is not None and problem.robot.backlash:
+        share = problem.robot.backlash / max(float(np.ptp(angles, axis=1).max()), 1e-300)
+        meaning = "play of a joint over the angle by which the joint that moves most moves"
+        yield BACKLASH, share, 1.0, meaning
     lean = float(body.imbalance(angles).max()) if isinstance(body, Chain) else 0.0
     if lean > BALANCED:
         meaning = "way from the centre of mass to where its weights press [body lengths]; "

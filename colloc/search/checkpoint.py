@@ -176,6 +176,10 @@ class Run:
         seconds = time.monotonic() - self._begin
         self.progress(Progress(stage, done, count, self.best, seconds, self._round))
 
+    def begin_again(self) -> None:
+        """Report from here on as if no stage had been."""
+        self.best, self._stage, self._round = None, STAGES[0], 1
+
     @contextmanager
     def active(self, seconds: float) -> Iterator[None]:
         """A block whose stages store their results here, ended by KeyboardInterrupt at Ctrl-C or

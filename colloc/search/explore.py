@@ -34,7 +34,7 @@ from colloc.mechanics.chain import Chain
 from colloc.reduced.program import ReducedProgram
 from colloc.results.answer import Alternative
 from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
-from colloc.search.checkpoint import active_run
+from colloc.search.checkpoint import active_run, checkpointed
 from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
 from colloc.search.optimise import (
     delta_levels,
@@ -138,6 +138,26 @@ def explore(problem: Problem, starts: int | None = None) -> Exploration:
             others.append(other)
     others.sort(key=lambda other: -other.value)
     return Exploration(optima, any_size.starts + large.starts, others, any_size.left)
+
+
+@checkpointed
+def farthest_distance(problem: Problem) -> float:
+    """Distance of the farthest gait that a few starts lead to."""
+    farthest = problem.with_(objective="distance", least_distance=None, shrinking=True)
+    return explore(farthest, OPTIONS.reach_starts).optima[0].value
+
+
+def with_reachable_distance(problem: Problem) -> Problem:
+    """The problem with its `least_distance` among `at_least`: all of it, or half of what the
+    farthest gait goes, if that is less. How far that goes is known first, so that no search is for
+    a distance that no gait reaches."""
+    stated = {aim.name for aim, _ in problem.at_least}
+    if problem.least_distance is None or "distance" in stated or not problem.gait.free:
+        return problem
+    farthest, least = farthest_distance(problem), problem.least_distance
+    least = least if farthest >= least else 0.5 * farthest
+    active_run().begin_again()
+    return problem.with_(at_least=(*problem.at_least, ("distance", least)))
 
 
 def follow_rest(problem: Problem, explored: Exploration) -> list[Iterate]:

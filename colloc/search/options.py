@@ -77,6 +77,8 @@ class SearchOptions:
     panel_error: float = 6.0
     # distance [rad] within which IPOPT has to confirm a gait
     confirm_radius: float = 0.01
+    # starts of the search for the farthest gait, of which `least_distance` may be a half
+    reach_starts: int = 8
     # parameters for which the curvature is measured, at two gradients each
     max_curvature_parameters: int = 150
     # gaits tried until a certificate passes, saddles left, smaller deltas tried

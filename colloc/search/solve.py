@@ -19,12 +19,18 @@ from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import is_visible, on_speed_floor
 from colloc.results.answer import Answer
-from colloc.results.checks import Certificate
+from colloc.results.checks import BACKLASH, Certificate
 from colloc.results.solution import Solution
 from colloc.search.certify import certify, is_trivial
 from colloc.search.checkpoint import Progress, Run, active_run, checkpointed
 from colloc.search.confirm import answer_of_iterate, confirm, solve_directly
-from colloc.search.explore import Exploration, explore, first_optimum, follow_rest
+from colloc.search.explore import (
+    Exploration,
+    explore,
+    first_optimum,
+    follow_rest,
+    with_reachable_distance,
+)
 from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
 from colloc.search.optimise import descend, leave_saddle, refine
 from colloc.search.options import OPTIONS, TOLERANCES, settings
@@ -34,6 +40,7 @@ from colloc.system.interruption import clear_interrupt
 REDUCED, FULL = "reduced", "full"
 SEARCHES = (REDUCED, FULL)
 _ADVICE = {
+    BACKLASH: "least_distance=0.1, or more idle power",
     "joint limits": "another guess or a smaller joint_limit",
     "self-contact": "another guess or a smaller joint_limit",
     "delta influence": "a smaller delta",
@@ -80,6 +87,8 @@ def solve(
 
 
 def _solve(problem: Problem, starts: int | None, accept: Callable[[Iterate], bool]) -> Solution:
+    asked = problem.least_distance
+    problem = with_reachable_distance(problem)
     explored, failure = None, ""
     if starts != 1 and problem.gait.free:
         try:
@@ -95,6 +104,12 @@ def _solve(problem: Problem, starts: int | None, accept: Callable[[Iterate], boo
         solutions += _finish_best(problem, follow_rest(problem, explored))
     solution = choose(problem, solutions)
     solution.starts, solution.others = explored.starts, tuple(explored.others)
+    least = {aim.name: least for aim, least in problem.at_least}.get("distance")
+    if asked is not None and least is not None and least < asked:
+        solution.message = (
+            f"The farthest gait goes {2 * least:.3g} body lengths a period, less than the "
+            f"{asked:g} asked for, so half of that was: {least:.3g}. {solution.message}"
+        ).strip()
     if failure and not solution.success:
         why = failure[:1].upper() + failure[1:]
         solution.message = f"{solution.message} {why}".strip()

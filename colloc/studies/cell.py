@@ -18,6 +18,7 @@ from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait, to_class
 from colloc.results.archive import ERROR, Outcome, outcome_fields, outcome_from
 from colloc.results.distinct_optima import SAME_GAIT, distance, fourier_series, phase_distance
 from colloc.results.solution import SOLVED
+from colloc.search.explore import with_reachable_distance
 from colloc.search.iterate import Iterate, space_near
 from colloc.search.optimise import project_to_zero_rotation
 from colloc.studies.solve import run_guess
@@ -153,7 +154,7 @@ def visit(work: Work) -> Visit:
     better than, or the same as, the certified one are passed over. If the best one promises more
     than the search from it keeps, it is tried once more from the problem's own delta_start.
     """
-    problem, attempts = work.problem, list[Attempt]()
+    problem, attempts = with_reachable_distance(work.problem), list[Attempt]()
     gaits = {start_key(gait): gait for gait in work.gaits}
     nearest = {key: member(problem, gait) for key, gait in gaits.items()}
     members = {key: gait for key, gait in nearest.items() if gait is not None}
@@ -203,7 +204,7 @@ def visit(work: Work) -> Visit:
     for key, gait in members.items():
         if scores[key] > enough():  # what remains is measured as finely as a certificate
             scores[key] = value_of(problem, gait, _FINE)
-    return Visit(problem.hash, attempts, scores)
+    return Visit(work.problem.hash, attempts, scores)
 
 
 def failed_visit(work: Work, status: str, message: str) -> Visit:

@@ -40,6 +40,7 @@ from colloc.results.kept import Saved, save_result
 from colloc.results.solution import SOLVED, Solution
 from colloc.search.certify import is_trivial
 from colloc.search.checkpoint import Progress
+from colloc.search.explore import with_reachable_distance
 from colloc.search.iterate import Iterate
 from colloc.search.solve import REDUCED
 from colloc.search.solve import solve as search_solve
@@ -278,7 +279,7 @@ def multistart(
         raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {shown(sampler)}.")
     if not time_limit > 0:
         raise ProblemError(f"time_limit must be positive, not {time_limit:g}.")
-    problem = _read(problem).problem
+    problem = with_reachable_distance(_read(problem).problem)
     store = Archive(problem) if archive is None else open_archive(problem, archive)
     done, report = store.done(sampler, seed, starts), reporter(verbose, progress)
     how: dict[str, Any] = {"workers": workers, "time_limit": time_limit, "executor": pool_for}

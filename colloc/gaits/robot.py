@@ -1,0 +1,150 @@
+"""A robot as it is stated, in SI units, and the numbers of a problem that follow from it.
+
+Problems have no dimensions: with body length L, weight m g and period T the pace is the Froude
+number Fr = L / (g T^2), a torque is in m g L, a joint speed in radians per T.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from colloc.gaits.objective import DRIVEN, Objective
+from colloc.gaits.regime import Free
+from colloc.mechanics.inertia import GRAVITY
+from colloc.system.arguments import is_number, named_arguments, shown
+from colloc.system.errors import ProblemError
+
+LARGEST = 1e9  # of metres, kilograms and seconds; the smallest is its inverse
+_LONGEST = 20.0  # metres; a longer body is rather one in centimetres
+INERTIA_COUNTS = 1e-3
+"""Froude number over the smallest friction coefficient from which inertia counts: it changes the
+efficiency by about its square times 1e3, a thousandth there."""
+DERIVED = ("froude", "speed_limit", "torque_limit")
+"""Fields of a problem that follow from a robot; the objective does unless one is stated."""
+
+
+@named_arguments
+@dataclass(frozen=True, kw_only=True)
+class Robot:
+    """A robot in SI units, for `Problem(robot=...)`: its pace, limits and objective follow from it.
+
+    Parameters
+    ----------
+    length : float
+        Of the stretched body [m].
+    mass : float
+        [kg].
+    period : float or (float, float)
+        Time that a cycle takes [s]; or the shortest and the longest, between which it is sought.
+    max_speed, max_torque : float or sequence of float, optional
+        Of all motors or of each [rad/s], [N m].
+    idle_power : float
+        What electronics draw, whatever the motors do [W].
+    backlash : float
+        Play of a joint [rad]; a gait whose joints all move by less is none.
+    gravity : float
+        [m/s^2].
+
+    Raises
+    ------
+    ProblemError
+        If a number is unusable, or looks as if it were in centimetres.
+
+    Examples
+    --------
+    >>> import colloc
+    >>> snake = colloc.Robot(length=0.62, mass=0.9, period=2.5, max_torque=1.2, idle_power=2)
+    >>> problem = colloc.Problem("snake", robot=snake)
+    >>> problem.objective.short, round(problem.froude, 4), round(problem.torque_limit, 3)
+    ('d/E', 0.0101, 0.219)
+    """
+
+    length: float
+    mass: float
+    period: float | tuple[float, float]
+    max_speed: float | tuple[float, ...] | None = None
+    max_torque: float | tuple[float, ...] | None = None
+    idle_power: float = 0.0
+    backlash: float = 0.0
+    gravity: float = GRAVITY
+
+    def __post_init__(self) -> None:
+        for name in ("period", "max_speed", "max_torque"):
+            value = getattr(self, name)
+            if isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, str):
+                object.__setattr__(self, name, tuple(np.ravel(np.array(value, object)).tolist()))
+        paces = self.period if isinstance(self.period, tuple) else (self.period,)
+        if len(paces) > 2 or (len(paces) == 2 and not paces[0] < paces[1]):
+            raise ProblemError(
+                f"period must be a number of seconds, or the shortest and the longest, not "
+                f"{shown(self.period)}."
+            )
+        sizes = [("length", self.length), ("mass", self.mass), ("gravity", self.gravity)]
+        for name, value in [*sizes, *(("period", x) for x in paces)]:
+            check_size(name, value)
+        for name in ("idle_power", "backlash"):
+            if not is_number(value := getattr(self, name)) or not 0 <= value <= LARGEST:
+                raise ProblemError(f"{name} must be a number from 0 on, not {shown(value)}.")
+        if self.length > _LONGEST:
+            raise ProblemError(
+                f"length={self.length:g} is {self.length:g} metres, and at most {_LONGEST:g} are "
+                f"taken. If these are centimetres, write length={self.length / 100:g}."
+            )
+        if isinstance(self.period, tuple) and self.max_speed is not None:
+            raise ProblemError(
+                "a period that is sought cannot be limited by max_speed yet: give the shortest "
+                "period that the motors allow, and leave max_speed out."
+            )
+
+    def pressing(self, grade: float) -> float:
+        """Component of gravity normal to the ground [m/s^2]."""
+        return self.gravity * math.cos(math.atan(grade))
+
+    def derived(self, grade: float, smallest_friction: float) -> dict[str, Any]:
+        """The objective and the fields `DERIVED` of a problem on such a grade; without inertia if
+        it does not count beside the smallest coefficient of friction."""
+        pressing = self.pressing(grade)
+        unit = self.mass * pressing * self.length  # of work and torque
+        times = self.period if isinstance(self.period, tuple) else (self.period,)
+        low, high = (self.length / (pressing * t**2) for t in (times[-1], times[0]))
+        froude: Any = Free(low, high) if len(times) == 2 else low
+        if high < INERTIA_COUNTS * smallest_friction and len(times) == 1:
+            froude = 0.0
+        root = math.sqrt(self.length / pressing)
+        idle, period = (
+            (self.idle_power * root / unit, " * period")
+            if len(times) == 2
+            else (self.idle_power * times[0] / unit, "")
+        )
+        battery = f"distance / (driven_work + {idle:.17g}{period})"
+        return {
+            "objective": Objective(battery, name=BATTERY) if idle else DRIVEN,
+            "froude": froude,
+            "speed_limit": _scaled(self.max_speed, times[0]),
+            "torque_limit": _scaled(self.max_torque, 1.0 / unit),
+        }
+
+
+BATTERY = "battery efficiency"
+"""Distance over the energy that a battery gives: work of motors that brake without regeneration,
+and idle power; in weights times length."""
+
+
+def check_size(name: str, value: Any) -> None:
+    """Raise a `ProblemError` for a length, mass, time or acceleration that no robot has."""
+    if not (is_number(value) and 1 / LARGEST <= value <= LARGEST):
+        raise ProblemError(
+            f"{name} must be a number from {1 / LARGEST:g} to {LARGEST:g} in SI units, not "
+            f"{shown(value)}."
+        )
+
+
+def _scaled(limit: Any, by: float) -> Any:
+    if isinstance(limit, tuple):
+        return tuple(by * each for each in limit)
+    return limit if limit is None else by * limit

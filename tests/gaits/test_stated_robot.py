@@ -1,0 +1,120 @@
+"""A robot in SI units is a problem without dimensions; what it says follows every change of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc import Chain, Free, Harmonic, Problem, ProblemError, Robot
+from colloc.results.robot import in_si
+
+SNAKE = Robot(length=0.62, mass=0.9, period=2.5, max_speed=5, max_torque=(1.2, 1.0), idle_power=2)
+SLOW = Robot(length=0.62, mass=0.9, period=600, idle_power=0.01, max_speed=0.05)
+
+
+def test_the_numbers_of_a_problem_follow_from_the_robot():
+    problem = Problem("snake", robot=SNAKE)
+    weight = 0.9 * 9.81
+    assert problem.froude == pytest.approx(0.62 / (9.81 * 2.5**2))
+    assert problem.speed_limit == pytest.approx(12.5)
+    np.testing.assert_allclose(problem.torque_limit, np.array([1.2, 1.0]) / (weight * 0.62))
+    period = {"distance": 0.2, "work": 0.5, "driven_work": 0.6}
+    energy = 0.6 * weight * 0.62 + 2 * 2.5  # J, for 0.2 body lengths
+    assert problem.objective(period) == pytest.approx(0.2 * 0.62 / energy * weight)
+
+
+def test_on_a_slope_that_part_of_gravity_counts_which_presses():
+    level, slope = (Problem("on", robot=SNAKE, grade=grade) for grade in (0.0, 0.75))
+    assert slope.froude == pytest.approx(level.froude * 1.25)
+    np.testing.assert_allclose(slope.torque_limit, 1.25 * np.array(level.torque_limit))
+
+
+def test_robots_that_are_one_without_dimensions_are_one_problem():
+    """Twice as long, with periods longer by the root; three times as heavy."""
+    root = 2**0.5
+    giant = Robot(
+        length=1.24,
+        mass=2.7,
+        period=2.5 * root,
+        max_speed=5 / root,
+        max_torque=(7.2, 6.0),
+        idle_power=12 / root,
+    )
+    one, other = (Problem("snake", robot=robot).without_robot for robot in (SNAKE, giant))
+    names = ("froude", "speed_limit", "torque_limit")
+    for name in names:
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-14)
+    period = {"distance": 0.2, "driven_work": 0.6}
+    assert one.objective(period) == pytest.approx(other.objective(period), rel=1e-14)
+
+
+def test_what_follows_from_the_robot_is_neither_stated_nor_saved_beside_it():
+    problem = Problem("snake", robot=SNAKE, objective="efficiency")
+    again = Problem.from_dict(problem.to_dict())
+    assert again.hash == problem.hash
+    assert again.objective == colloc.Objective("efficiency")
+    assert again.robot == SNAKE
+    assert not {"froude", "speed_limit", "torque_limit"} & problem.to_dict().keys()
+    faster = problem.with_(robot=replace(SNAKE, period=1.25))
+    assert faster.froude == pytest.approx(4 * problem.froude)
+    battery = problem.with_(objective=None, robot=replace(SNAKE, idle_power=0.0))
+    assert battery.objective.name == "driven efficiency"
+    with pytest.raises(ProblemError, match="froude follows from the robot"):
+        Problem("snake", robot=SNAKE, froude=0.1)
+    with pytest.raises(ProblemError, match="robot must be a Robot"):
+        Problem("snake", robot={"length": 1})
+
+
+def test_inertia_counts_from_a_thousandth_of_friction_on():
+    """A robot of 0.62 m that takes ten minutes is slow; there it changes the efficiency by less
+    than a thousandth (docs/howto/inertia.md)."""
+    assert Problem("slow", robot=SLOW).froude == 0
+    assert Problem("quick", robot=replace(SLOW, period=7.0, max_speed=None)).froude > 0
+    free = Problem("free", robot=replace(SLOW, period=(5.0, 10.0), max_speed=None))
+    assert free.froude == pytest.approx(Free(0.62 / 9.81 / 100, 0.62 / 9.81 / 25))
+    assert "period" in free.objective.uses
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"length": 62.0}, "62 metres.*write length=0.62"),
+        ({"mass": 0.0}, "mass must be a number"),
+        ({"period": (3.0, 2.0)}, "the shortest and the longest"),
+        ({"idle_power": -1.0}, "idle_power must be a number from 0 on"),
+        ({"max_speed": 5.0, "period": (1.0, 2.0)}, "cannot be limited by max_speed"),
+    ],
+)
+def test_what_no_robot_is_gets_a_sentence(wrong, words):
+    with pytest.raises(ProblemError, match=words):
+        Robot(**{"length": 0.62, "mass": 0.9, "period": 2.5} | wrong)
+
+
+@pytest.fixture(scope="module")
+def slow_robot():
+    body = Chain((0.2, 0.3, 0.3, 0.2))
+    problem = Problem("slow", body=body, gait=Harmonic(1, "antipodal"), robot=SLOW, delta=1e-2)
+    return colloc.solve(problem, starts=2)
+
+
+def test_speed_and_energy_are_those_of_the_period_in_metres_and_joules(slow_robot):
+    assert slow_robot.success
+    facts, unit = in_si(slow_robot), 0.9 * 9.81 * 0.62
+    assert facts["speed_m_per_s"] == pytest.approx(slow_robot.distance * 0.62 / 600)
+    motors = unit * slow_robot.certificate.values["driven_work"]
+    assert facts["energy_J_per_m"] == pytest.approx(
+        (motors + 0.01 * 600) / (slow_robot.distance * 0.62)
+    )
+    # the best value is the inverse of this cost, in weights
+    assert slow_robot.value == pytest.approx(0.9 * 9.81 / facts["energy_J_per_m"], rel=1e-9)
+    sheet = slow_robot.robot()
+    assert sheet.facts["period_s"] == 600
+    assert sheet.facts["speed_m_per_s"] == pytest.approx(facts["speed_m_per_s"], rel=1e-3)
+
+
+@pytest.mark.parametrize(("over_swing", "failures"), [(0.99, []), (1.01, ["backlash"])])
+def test_a_gait_below_the_play_of_the_joints_is_no_answer(slow_robot, over_swing, failures):
+    robot = replace(SLOW, backlash=over_swing * slow_robot.swings.max())
+    answer = replace(slow_robot.answer, problem=slow_robot.problem.with_(robot=robot))
+    assert [check.name for check in colloc.certify(answer).failures] == failures
