@@ -14,7 +14,7 @@ from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate,
 from colloc.commands.main import main
 from colloc.pictures.report_page import report_page
 from colloc.results.motion import Arc, arc
-from colloc.results.robot import Robot
+from colloc.results.robot import RobotSheet
 from colloc.verification.trajectory import plan_trajectory
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
@@ -144,7 +144,7 @@ def test_weak_motors_are_told_whether_a_longer_period_helps(three_link):
 def test_weak_motors_are_told_of_where_the_motion_with_inertia_is_not_found(
     three_link, monkeypatch
 ):
-    monkeypatch.setattr(Robot, "_with_inertia", None)
+    monkeypatch.setattr(RobotSheet, "_with_inertia", None)
     sheet = str(three_link.robot(**SIZE, max_torque=1.5))
     assert "Motors are too weak in slow motion as well" in sheet
     assert "the effect of inertia at this pace" in sheet
