@@ -56,6 +56,7 @@ _NAMES = {
     "studies.families": "pareto_front steer",
     "results.solution": "Solution",
     "results.store": "load save",
+    "pictures.controllers": "Servo",
     "search.evaluate": "evaluate",
     "search.certify": "certify",
     "verification.replay": "replay",

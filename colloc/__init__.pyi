@@ -36,6 +36,7 @@ from colloc.studies.study import Study as Study, Axis as Axis
 from colloc.studies.families import pareto_front as pareto_front, steer as steer
 from colloc.results.solution import Solution as Solution
 from colloc.results.store import load as load, save as save
+from colloc.pictures.controllers import Servo as Servo
 from colloc.search.evaluate import evaluate as evaluate
 from colloc.search.certify import certify as certify
 from colloc.verification.replay import replay as replay

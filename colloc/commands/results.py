@@ -38,6 +38,24 @@ _ERRORS = {
     "value_at_zero_delta": "value_error_at_zero_delta",
 }
 """Numbers of a certificate that have an error of their own; for others the tolerance is taken."""
+_ENDINGS = {
+    "csv": "csv",
+    "json": "json",
+    "pulses": "csv",
+    "ros": "yaml",
+    "c": "h",
+    "mjcf": "xml",
+    "urdf": "urdf",
+}
+_SERVO = tuple(
+    cli.option(kind, f"--{name}", metavar, f"of servos: {what}, one or one each", nargs="+")
+    for kind, name, metavar, what in (
+        (float, "neutral", "PULSE", "pulse of the straight joint (default: 1500)"),
+        (float, "scale", "PULSES", "pulses per degree (default: 2000 for 180 degrees)"),
+        (int, "sign", "SIGN", "1, or -1 where larger pulses turn clockwise"),
+        (float, "clamp", "PULSE", "LOW HIGH (default: 500 2500, without --scale)"),
+    )
+)
 
 
 def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TOLERANCE) -> str:
@@ -300,9 +318,13 @@ before time 0 lead from the straight body, at rest, into the gait.
   colloc export results/three_link.h5 --max-speed 2.0 1.0 --rate 100      as fast as they allow
   colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3    with torques, powers
   colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3 --format mjcf    for MuJoCo
+  colloc export results/three_link.h5 --period 4 --format pulses --sign 1 -1    pulses of servos
+  colloc export results/three_link.h5 --period 4 --format ros    a JointTrajectory; c: a C header
 
 Columns: time_s, joint_1_rad, ..., joint_1_rad_per_s, ..., joint_1_N_m, ..., joint_1_W, ... (mode_1
-of a smooth body). Joints count from tail to head; angles are positive counter-clockwise.""",
+of a smooth body). Joints count from tail to head; angles are positive counter-clockwise. A pulse is
+neutral + sign * scale * degrees; what is clamped is counted. C has pulses if one of these is given.
+""",
     cli.RESULT,
     cli.option(float, "--rate", "HZ", "samples a second (default: 50)", 50.0),
     cli.PERIOD,
@@ -315,17 +337,27 @@ of a smooth body). Joints count from tail to head; angles are positive counter-c
     }),
     cli.option(
         str, "--format", None, "default: --output's, else csv",
-        choices=("csv", "json", "mjcf", "urdf"),
+        choices=tuple(_ENDINGS),
     ),
+    cli.flag("--degrees", "instead of radians, in CSV and JSON"),
+    *_SERVO,
     cli.output("folder or file (default: beside the result)"),
 )  # fmt: skip
 def export(options: argparse.Namespace) -> int:
+    from colloc.pictures.controllers import Servo
+
     source = Path(options.result)
     solution = load(source)
-    options.format = "xml" if options.format == "mjcf" else options.format
-    path = cli.output_path(options, source, ("csv", "json", "xml", "urdf"))
-    names = ("period", "max_speed", "rate", "periods", "ramp", "length", "mass", "gravity")
-    facts = solution.export(path, **cli.values(options, *names)) | {"file": str(path)}
+    stated = cli.values(options, "neutral", "scale", "sign", "clamp")
+    stated = {name: values for name, values in stated.items() if values is not None}
+    pulses = options.format == "pulses" or stated
+    servo = Servo(**stated) if pulses else None
+    options.format = _ENDINGS.get(options.format)
+    named = source.with_suffix(".pulses.csv") if pulses else source
+    path = cli.output_path(options, named, [*dict.fromkeys(_ENDINGS.values())])
+    names = ("period", "max_speed", "rate", "periods", "ramp", "degrees")
+    settings = cli.values(options, *names, "length", "mass", "gravity")
+    facts = solution.export(path, **settings, servo=servo) | {"file": str(path)}
     if path.suffix in (".xml", ".urdf"):
         lines = [
             f"saved {path}: a robot of {facts['length_m']:g} m and {facts['mass_kg']:g} kg; "
@@ -355,6 +387,8 @@ def _trajectory_lines(solution: Solution, facts: dict[str, Any], periods: int) -
             f"  {facts['ramp_s']:g} s before time 0 lead from straight, at rest, into the gait "
             f"(--no-ramp leaves them out)"
         )
+    if "ramp_out_s" in facts:
+        lines.append(f"  {facts['ramp_out_s']:g} s after the gait lead back to straight, at rest")
     if "end_body_lengths" in facts:
         x, y = (facts.get("length_m", 1.0) * place for place in facts["end_body_lengths"])
         unit = "m" if "length_m" in facts else "body lengths"
@@ -365,6 +399,15 @@ def _trajectory_lines(solution: Solution, facts: dict[str, Any], periods: int) -
             f"{ahead} and {abs(y):.3g} to the {aside} of where it was straight, its tail link "
             f"turned by {facts['end_turned_deg']:.3g}° ({how})"
         )
+    if "pulses" in facts:
+        stated = (
+            f"{name} {', '.join(f'{x:.6g}' for x in facts[name] or ()) or 'none'}"
+            for name in ("neutral", "scale", "sign", "clamp")
+        )
+        lines.append(f"  pulses: {'; '.join(stated)}")
+        if any(clamped := facts["clamped_samples"]):
+            counts = ", ".join(f"{n} of joint {j}" for j, n in enumerate(clamped, 1) if n)
+            lines.append(f"  note: pulses are clamped, {counts}: the robot does another gait")
     if solution.turning:
         lines.append(f"  {solution.turning}")
     if "pace" in facts:

@@ -1,4 +1,5 @@
-"""A gait over time as CSV or JSON, and its robot as a model for simulators, MJCF (MuJoCo) and URDF.
+"""A gait over time as CSV or JSON, for ROS 2 or in C, and its robot as a model for simulators, MJCF
+(MuJoCo) and URDF.
 
 Models are in SI units: links have the problem's lengths, masses and inertias; joints are hinges
 about the vertical.
@@ -37,6 +38,7 @@ from colloc.mechanics.friction import Friction
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.pictures import render
+from colloc.pictures.controllers import Servo, c_table, commented, joint_trajectory
 from colloc.results.motion import RigidMotion
 from colloc.results.robot import (
     RobotSheet,
@@ -63,6 +65,7 @@ _CROSSES = 1e-8  # depth of links in each other above rounding [body lengths]
 _FINE, _ACCURACY = 2000, 1e-5  # samples per period, and error, of where the body ends
 _SETTLED = 10  # periods after which all are alike
 _UNITS = {"rad": "angles", "rad_per_s": "speeds", "N_m": "torques", "W": "powers"}
+_UNITS |= {"deg": "angles", "deg_per_s": "speeds"}
 _UNKNOWN = ProblemError, NotConvergedError
 _THIN = 0.02  # width and height of links that have none [body lengths]
 _POINTS = 16  # on which a pad or a link stands
@@ -83,6 +86,8 @@ def write_export(
     rate: float = 50.0,
     periods: int = 1,
     ramp: bool = True,
+    degrees: bool = False,
+    servo: Servo | None = None,
     length: float | None = None,
     mass: float | None = None,
     gravity: float | None = None,
@@ -93,8 +98,9 @@ def write_export(
     ----------
     solution : Solution
     path : Path
-        Ends in ``.csv`` or ``.json``; or in ``.xml`` (MJCF) or ``.urdf`` for a model of the robot,
-        which takes `period`, `length` and `mass`.
+        Ends in ``.csv`` or ``.json``; ``.yaml``, a ``JointTrajectory`` of ROS 2, or ``.h``, a table
+        in C; or in ``.xml`` (MJCF) or ``.urdf`` for a model of the robot, which takes `period`,
+        `length` and `mass`.
     period : float, optional
         [s], rounded up to a whole number of samples; by default the shortest within `max_speed`.
     max_speed : float or (n_joint,), optional
@@ -104,7 +110,12 @@ def write_export(
         Samples per second.
     periods : int
     ramp : bool
-        Lead from the straight body, at rest, into the gait at times below 0.
+        Lead from the straight body, at rest, into the gait at times below 0. A message of ROS 2
+        also ends there, as its controllers refuse one that ends in motion.
+    degrees : bool
+        Write degrees, in CSV and JSON.
+    servo : Servo, optional
+        Write pulses instead of angles, in CSV and C.
     length, mass : float, optional
         Of the robot [m], [kg], to write torques [N m] and powers [W], too. These, and the period
         without `max_speed`, are by default those of the problem's robot.
@@ -122,13 +133,17 @@ def write_export(
         If an argument is missing or unusable, the motion is prescribed, or the ramp crosses itself.
     """
     check_count(periods=periods)
-    problem, kinds = solution.problem, (".csv", ".json", *MODELS)
+    problem, kinds = solution.problem, (".csv", ".json", ".yaml", ".h", *MODELS)
     if path.suffix not in kinds:
         raise ProblemError(f"{path} should end in {' or '.join(kinds)}.")
     if not problem.gait.free:
         raise ProblemError(
             f"{problem.name} is a prescribed motion of a smooth body: it has no joints to export."
         )
+    if degrees and (servo or path.suffix not in (".csv", ".json")):
+        raise ProblemError("degrees are for angles in CSV and JSON: leave them out.")
+    if servo and path.suffix not in (".csv", ".h"):
+        raise ProblemError(f"pulses of servos are written as .csv or .h, not {path.suffix}.")
     if problem.robot is not None:
         stated = stated_robot(solution, length=length, mass=mass, period=period, gravity=gravity)
         length, mass, gravity = (stated[name] for name in ("length", "mass", "gravity"))
@@ -178,7 +193,7 @@ def write_export(
         facts["pace"] = f"the gait's own, as {paced_by}; distance and work are those {holds}"
         facts |= {"froude_number": froude} if froude else {}
 
-    def into_gait(rate: float) -> Approach:
+    def into_gait(rate: float, trajectory: Trajectory = trajectory) -> Approach:
         speeds, most = np.abs(trajectory.speeds), limits
         if limits is None:
             stated = np.array(problem.largest_speeds) / trajectory.period
@@ -231,14 +246,33 @@ def write_export(
         time = np.append(parts[0].time, time)
         table = np.append(np.array(rows[0]), table, axis=2)
     columns = dict(zip(_UNITS, table, strict=False))
+    if degrees:
+        columns = {
+            unit.replace("rad", "deg"): np.degrees(values) if "rad" in unit else values
+            for unit, values in columns.items()
+        }
+    if servo:
+        pulses, clamped = servo.pulses(table[0])
+        columns, facts = {"pulse": pulses}, facts | servo.facts() | {"clamped_samples": clamped}
+    motors = [f"{gait.coordinate}_{j + 1}" for j in range(table.shape[1])]
     if path.suffix == ".csv":
-        names = [
-            f"{gait.coordinate}_{j + 1}_{unit}" for unit in columns for j in range(table.shape[1])
-        ]
-        lines = [f"# {key}: {json.dumps(value)}" for key, value in facts.items()]
-        lines.append(",".join(["time_s", *names]))
-        lines += [",".join(f"{x:.9g}" for x in row) for row in np.vstack([time, *table]).T]
+        names = [f"{joint}_{unit}" for unit in columns for joint in motors]
+        lines = [*commented(facts), ",".join(["time_s", *names])]
+        samples = np.vstack([time, *columns.values()]).T
+        lines += [",".join(f"{x:.9g}" for x in row) for row in samples]
         write_text(path, "\n".join(lines) + "\n")
+    elif path.suffix == ".h":
+        write_text(path, c_table(facts, path, motors, time, next(iter(columns.values()))))
+    elif path.suffix == ".yaml":
+        angles, speeds = table[:2]
+        if ramp:  # and out of it, as into the gait played backwards
+            back = [np.roll(x[:, ::-1], 1, axis=1) for x in (trajectory.angles, trajectory.speeds)]
+            way = into_gait(rate, replace(trajectory, angles=back[0], speeds=-back[1]))
+            angles = np.hstack([angles, trajectory.angles[:, :1], way.angles[:, ::-1]])
+            speeds = np.hstack([speeds, trajectory.speeds[:, :1], -way.speeds[:, ::-1]])
+            time = time[0] + np.arange(angles.shape[1]) / rate
+            facts["ramp_out_s"] = -float(way.time[0])
+        write_text(path, joint_trajectory(facts, motors, time, angles, speeds))
     else:
         arrays = {f"{_UNITS[unit]}_{unit}": values.tolist() for unit, values in columns.items()}
         content = {**facts, "coordinate": gait.coordinate, "time_s": time.tolist(), **arrays}

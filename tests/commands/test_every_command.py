@@ -88,8 +88,14 @@ animate good.h5 --output x.avi -> x.avi should end in .gif or .mp4
 animate good.h5 --format mp4 --output x.gif -> x.gif should end in .mp4
 export | nope.h5 | text.h5 | good.h5 | good.h5 --period 4 --rate nan | good.h5 --period 4 --mass 1
 export | good.h5 --period 4 --max-speed 0 | good.h5 --period 4 --max-speed 1 2 3 | good.h5 --period 4 --periods 0
-export good.h5 --format x -> --format must be one of 'csv', 'json', 'mjcf', 'urdf', not 'x'
+export good.h5 --format x -> --format must be one of 'csv', 'json', 'pulses', 'ros', 'c', 'mjcf', 'urdf', not 'x'
 export good.h5 --period 4 --output x.xlsx -> x.xlsx should end in .csv or .json
+export good.h5 --period 4 --format ros --degrees -> degrees are for angles in CSV and JSON
+export good.h5 --period 4 --format ros --neutral 1500 -> pulses of servos are written as .csv or .h
+export good.h5 --period 4 --sign 2 -> sign of servos must be 1 or -1, not [2]
+export good.h5 --period 4 --clamp 500 -> clamp of servos must be pairs of a low and a high number
+export good.h5 --period 4 --clamp 2500 500 -> clamp of servos must be pairs of a low and a high number
+export good.h5 --period 4 --scale 1 2 3 -> scale of servos is given for 3 joints of 2
 evaluate | problem.py | problem.py nope.csv | nope.py text.h5 | problem.py text.h5 | problem.py text.h5 --period x
 evaluate problem.py good.h5 -> good.h5 is no text of numbers in UTF-8: a CSV file is read here
 robot | nope.h5 --length 1 --mass 1 --period 1 | good.h5 | good.h5 --length 1 --mass 1
