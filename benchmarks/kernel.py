@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from dataclasses import astuple
 from functools import partial
+from unittest.mock import patch
 
 import numpy as np
 
 from benchmarks.tables import interleaved_seconds, markdown_table
 from colloc import Chain, Friction, solve_balance
-from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics import native_kernel
 from scripts.program import command_line
 
 BODY, MANY = Chain(), 10_000
@@ -29,7 +30,7 @@ def random_instants(count: int, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
 
 def main() -> None:
     command_line(__doc__)
-    if native_kernel() is None:
+    if native_kernel.native_kernel() is None:
         raise SystemExit("no C compiler on this machine, so there is nothing to compare.")
     rows = []
     for law in LAWS:
@@ -41,7 +42,7 @@ def main() -> None:
                 balances = partial(solve_balance, BODY, law, *random_instants(count), delta)
 
                 def by_numpy(balances: partial = balances) -> None:
-                    with numpy_instead():
+                    with patch.object(native_kernel, "library", lambda: None):
                         balances()
 
                 spent = interleaved_seconds({"C": balances, "NumPy": by_numpy}, at_least=0.2)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from benchmarks.tables import cached
 from colloc import Harmonic, Problem, certify, ellipse
@@ -27,9 +28,8 @@ from colloc.pictures.style import (
     PURPLE,
     SKY,
     VERMILION,
+    figure_style,
     save,
-    styled,
-    subplots,
 )
 from colloc.results.solution import Solution
 from colloc.search.explore import first_optimum
@@ -119,8 +119,9 @@ def save_work_precision(
 ) -> list[Path]:
     """Errors on uniform and on refined meshes against processor time, one colour a scheme; PNG and
     PDF."""
-    with styled():
-        figure, axes = subplots(figsize=(6.6, 4.4))
+    with figure_style():
+        figure = Figure(figsize=(6.6, 4.4))
+        axes = figure.subplots()
         for index, scheme in enumerate(uniform):
             style = {
                 "color": _COLOURS[index % len(_COLOURS)],

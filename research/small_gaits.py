@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.bounds.motions import (
+    DELTA,
     CoulombMotion,
     SmallGait,
     admissible,
-    balanced_motion,
+    all_motions,
     best_mixture,
     fundamental,
     gain_along,
@@ -34,6 +35,13 @@ _CLIMBED, _WAYS = 12, 4
 _STEPS = 14
 _ROUNDS = 12
 _GAIN = 1e-7
+
+
+def balanced_motion(
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
+) -> CoulombMotion:
+    """One motion for each of shapes and rates ``(n_joint, n)`` that converges."""
+    return all_motions(body, friction, angles, rates, delta, one_each=True)[0]
 
 
 class _Columns:

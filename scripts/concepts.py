@@ -14,7 +14,17 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Arc
 
 import colloc
-from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, VERMILION, Picture, save, styled
+from colloc.pictures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    VERMILION,
+    Picture,
+    figure_style,
+    save,
+)
 from colloc.results.motion import lab_outline
 from colloc.results.solution import Solution
 from scripts.program import command_line
@@ -135,7 +145,7 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     solutions = {name: colloc.solve(ROOT / "problems" / f"{name}.py") for name in CLASSES}
     sizes = {"body": (6.6, 2.3), "gait": (6.6, 4.4), "delta": (4.6, 2.8), "size": (5, 3.2)}
-    with styled():
+    with figure_style():
         figures = {name: Picture(figsize=size) for name, size in sizes.items()}
         body_and_friction(figures["body"].subplots())
         left, right = figures["gait"].subplots(1, 2, width_ratios=(1, 2))

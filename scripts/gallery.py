@@ -20,7 +20,7 @@ from PIL import Image
 
 from colloc.gaits.problem_file import Reference
 from colloc.pictures.figure import draw_filmstrip, draw_gait, draw_lab
-from colloc.pictures.style import styled
+from colloc.pictures.style import figure_style
 from colloc.results.solution import Solution
 from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
@@ -64,7 +64,7 @@ def solved_row(solution: Solution) -> dict[str, Any]:
 def picture(solution: Solution) -> Figure:
     """A solution for the gallery: a period frame by frame, the paths in the lab, and the path or
     all angles beside them."""
-    with styled():
+    with figure_style():
         figure = Figure(figsize=_SIZE)
         grid = figure.add_gridspec(2, 2, width_ratios=(2.3, 1), height_ratios=(1, 1.5))
         draw_filmstrip(figure.add_subplot(grid[0, 0]), solution, count=9)
@@ -82,7 +82,7 @@ def _sheet() -> None:
     """All pictures on one sheet, with their names."""
     paths = sorted(PICTURES.glob("*.png"))
     rows = -(-len(paths) // _COLUMNS)
-    with styled(font_size=10):
+    with figure_style(font_size=10):
         height = _SIZE[1] / _SIZE[0] * _THUMBNAIL + 26
         figure = Figure(figsize=(_COLUMNS * _THUMBNAIL / 100, rows * height / 100), dpi=100)
         for path, axes in zip(paths, figure.subplots(rows, _COLUMNS).flat, strict=False):
@@ -107,7 +107,7 @@ def main() -> None:
         row = solved_row(solution) | {"cpu_seconds": round(time.process_time() - begin, 1)}
         table[example.name] = row
         path = PICTURES / f"{example.name}.png"
-        with styled():
+        with figure_style():
             picture(solution).savefig(path, dpi=_RESOLUTION)
         _quantised(path)
         value = row.get("efficiency", float("nan"))

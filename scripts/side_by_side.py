@@ -21,7 +21,17 @@ import colloc
 from colloc.mechanics.bodies import Body
 from colloc.pictures.figure import BodyMarks
 from colloc.pictures.movie import write_gif
-from colloc.pictures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION, styled
+from colloc.pictures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    figure_style,
+)
 from colloc.results.motion import lab_feet, lab_outline
 from colloc.results.solution import Solution
 from scripts.program import command_line
@@ -81,7 +91,7 @@ def pictures(crawls: list[Crawl]) -> Iterator[np.ndarray]:
     farthest = max(float(c.ends[0].max()) for c in crawls) + 0.06
     span = (-_BEHIND, farthest)
     height = round(_WIDTH * (_LANE * len(crawls) + 0.3) / (span[1] - span[0]))
-    with styled(font_size=9):
+    with figure_style(font_size=9):
         figure = Figure(figsize=(_WIDTH / 100, height / 100), dpi=100)
         figure.set_layout_engine("none")
         canvas = FigureCanvasAgg(figure)

@@ -102,13 +102,6 @@ def all_motions(
     return CoulombMotion(angles, rates, velocity, spin, power), source
 
 
-def balanced_motion(
-    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
-) -> CoulombMotion:
-    """One motion for each of shapes and rates ``(n_joint, n)`` that converges."""
-    return all_motions(body, friction, angles, rates, delta, one_each=True)[0]
-
-
 def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarray:
     """Mask ``(n,)`` of shapes whose links i, i + 2 do not cross (to within `margin`) and keep their
     width."""

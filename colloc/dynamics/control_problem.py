@@ -16,7 +16,7 @@ import numpy as np
 from colloc.dynamics.dynamics import QuasiStatic, StaticParameter, dynamics_of
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.limits import Limit, widest
-from colloc.gaits.objective import Objective, integrals_of
+from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.symmetry import fraction
 from colloc.mechanics.bodies import Body
@@ -69,7 +69,6 @@ class Admissible(NamedTuple):
         return np.append(self.gait.nearest(near) if kept else self.gait.parameters(near), static)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and largest parameters."""
         lower, upper = self.gait.bounds(self.body, widest(self.joint_limit))
         return (
             np.append(lower, [each.lower for each in self.static]),
@@ -78,19 +77,13 @@ class Admissible(NamedTuple):
 
 
 class Aims(NamedTuple):
-    """Objective, required values, prescribed rotation."""
-
     objective: Objective
     at_least: tuple[tuple[Objective, float], ...]
+    integrals: tuple[Quantity, ...]
     rotation: float | None
     no_way_across: bool
     closing: str
     """Symmetry that closes the net rotation."""
-
-    @property
-    def integrals(self) -> tuple[Quantity, ...]:
-        """Quantities that are integrals over a period."""
-        return integrals_of((self.objective, *(aim for aim, _ in self.at_least)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +113,7 @@ class ControlProblem:
     def in_phases(self, mesh: Mesh, gait: AnyGait) -> Mesh:
         return Mesh(mesh.scheme, self.admissible.gait.phases(gait, mesh.edges))
 
-    def stated(self, value: float) -> float:
+    def unscale(self, value: float) -> float:
         """Value of the objective in the problem's units."""
         return value * _size(self.aims.objective, self.unit)
 
@@ -148,6 +141,7 @@ def control_problem(problem: Problem) -> ControlProblem:
         Aims(
             problem.objective,
             tuple((aim, value / _size(aim, unit)) for aim, value in problem.at_least),
+            problem.integrals,
             # a row that holds whatever the gait would have no slope but what the mesh errs by
             None if problem.keeps_heading else problem.rotation,
             regime.towards is not None,

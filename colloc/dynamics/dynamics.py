@@ -360,19 +360,19 @@ class Inertial(QuasiStatic):
         return (period, *self.slow.static_parameters)
 
     @property
-    def _timed(self) -> int:
+    def _n_period(self) -> int:
         return int(self.regime.free is not None)
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
         return self.slow.instants(shapes, theta, z)
 
     def totals(self, passed: PeriodTotals) -> dict[str, float]:
-        timed = {"period": float(np.exp(passed.static[0]))} if self._timed else {}
+        timed = {"period": float(np.exp(passed.static[0]))} if self._n_period else {}
         return self.slow.totals(passed) | timed
 
     def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
         found = self.slow.total_gradients(passed)
-        if self._timed:
+        if self._n_period:
             found["period"] = TotalGradient(static=float(np.exp(passed.static[0])))
         return found
 
@@ -385,7 +385,7 @@ class Inertial(QuasiStatic):
         near_z: np.ndarray | None = None,
     ) -> Trajectory:
         if near_states is None:
-            slow = self.slow.simulate(mesh, shapes, static[self._timed :])
+            slow = self.slow.simulate(mesh, shapes, static[self._n_period :])
             posture = self.chain.posture(shapes.angles)
             link = self.chain.velocity(posture, shapes.rates, slow.now.z)
             at_first = momenta(self.chain, posture, link)
@@ -403,7 +403,7 @@ class Inertial(QuasiStatic):
             froude, k = self.froude_at(shapes, static), 2 * self.chain.n_joint
             found = momenta_at(self.chain, self.law, shapes[:3], states[_MOMENTA], froude)
             out, slopes = self._with_pull(*found, states, froude)
-            on_pace = np.zeros((len(out), self._timed, out.shape[1]))
+            on_pace = np.zeros((len(out), self._n_period, out.shape[1]))
             on_pace[_MORE] = 2.0 * (out[_MORE] - turning(z, states[_MOMENTA]))[:, None]
             return slopes[:, :k], np.concatenate([slopes[:, k:], on_pace], axis=1)
 
@@ -424,7 +424,7 @@ class Inertial(QuasiStatic):
     def _newton(
         self, mesh: Mesh, shapes: Shapes, near: np.ndarray, static: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        out, first = near, np.append(near[_MOMENTA, 0], static[self._timed :])
+        out, first = near, np.append(near[_MOMENTA, 0], static[self._n_period :])
         froude, equations = self.froude_at(shapes, static), self.equations(mesh, shapes.unit)
         library = None if self.slow.states else native_kernel(self.chain, self.law)
         if library is not None:
@@ -470,7 +470,7 @@ class Inertial(QuasiStatic):
         return out, slopes
 
     def froude_at(self, shapes: Shapes, static: np.ndarray) -> float:
-        froude = float(np.exp(-2.0 * static[0])) if self._timed else self.regime.froude
+        froude = float(np.exp(-2.0 * static[0])) if self._n_period else self.regime.froude
         return froude * shapes.unit**2
 
 

@@ -133,7 +133,7 @@ class Corners(GaitFunction):
         rates = (vertices[:, k + 1] - vertices[:, k]) / (phases[k + 1] - phases[k])
         return vertices[:, k] + rates * (phase - phases[k]), rates
 
-    def mapped(self, matrix: np.ndarray) -> Corners:
+    def transform(self, matrix: np.ndarray) -> Corners:
         return Corners(matrix @ self.corners, self.symmetry)
 
     def grown(self, factor: float) -> Corners:

@@ -84,7 +84,7 @@ class Basis(LinearClass):
         return isinstance(self.columns[0][0], tuple)
 
     @cached_property
-    def _interpolated(self) -> tuple[Any, float, int]:
+    def _spline(self) -> tuple[Any, float, int]:
         """A spline through the columns, its relative error, and the number of harmonics."""
         from scipy.interpolate import make_interp_spline
 
@@ -110,14 +110,14 @@ class Basis(LinearClass):
     @property
     def error(self) -> float:
         """Estimated error of interpolation, relative to the largest value."""
-        return self._interpolated[1]
+        return self._spline[1]
 
     @property
     def harmonics(self) -> int:  # type: ignore[override]
-        return self._interpolated[2]
+        return self._spline[2]
 
     def functions(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
-        return self._interpolated[0](np.asarray(t) % 1.0, nu=derivative).T
+        return self._spline[0](np.asarray(t) % 1.0, nu=derivative).T
 
     def label(self, number: int) -> str:
         return super().label(number // len(self.columns[0]) if self._whole else number)

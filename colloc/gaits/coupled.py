@@ -144,7 +144,7 @@ class Coupled(LinearClass):
         joints = self.joint_map(gait.n_joint)
         if getattr(gait, "basis", None) == self:
             return self.gait.member(self.nearest(gait), joints.n_motor)
-        return self.gait.through(gait.mapped(joints.inverse))
+        return self.gait.through(gait.transform(joints.inverse))
 
     def motor_gait(self, gait: Any) -> Any:
         return self._motors(gait).with_coordinate("motor")

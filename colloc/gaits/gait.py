@@ -38,7 +38,7 @@ class GaitFunction:
     def rates(self, t: np.ndarray) -> np.ndarray:
         return self(t)[1]
 
-    def mapped(self, matrix: np.ndarray) -> Any:
+    def transform(self, matrix: np.ndarray) -> Any:
         """The gait with shapes multiplied by a matrix ``(m, n_joint)``."""
         raise NotImplementedError
 
@@ -57,7 +57,7 @@ class GaitFunction:
 
     def scaled(self, factor: float) -> Any:
         """The gait with all angles but those at rest multiplied by a factor."""
-        return self.mapped(factor * np.eye(self.n_joint))
+        return self.transform(factor * np.eye(self.n_joint))
 
     @property
     def mirrored(self) -> Any:

@@ -108,7 +108,7 @@ class Fourier(GaitFunction):
             lines.append(f"{self.coordinate} {j + 1}: {' '.join(terms)}")
         return [*lines, *self.pointing]
 
-    def mapped(self, matrix: np.ndarray) -> Fourier:
+    def transform(self, matrix: np.ndarray) -> Fourier:
         return Fourier(*(matrix @ part for part in (self.mean, self.cos, self.sin)))
 
     def grown(self, factor: float) -> Fourier:

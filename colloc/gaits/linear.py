@@ -92,8 +92,8 @@ class Combination(GaitFunction):
             formulas.append(f"{self.coordinate} {j}: {' '.join(terms) or '0'}")
         return [f"φ: {self.basis.describe()}", *formulas, *self.pointing]
 
-    def mapped(self, matrix: np.ndarray) -> Any:
-        return self.basis.series(_SERIES).through(self).mapped(matrix)
+    def transform(self, matrix: np.ndarray) -> Any:
+        return self.basis.series(_SERIES).through(self).transform(matrix)
 
     def scaled(self, factor: float) -> Combination:
         return Combination(self.basis, factor * self.table)

@@ -56,10 +56,10 @@ def parameters(problem: Problem) -> list[Parameter]:
     numbers = []
 
     def add(name: str, value: float, field: str, new: Callable[[float], Any], **how: bool) -> None:
-        def changed(by: float) -> Problem:
+        def change(by: float) -> Problem:
             return problem.with_(**{"guess": None, field: new(by)})  # a guess need not fit
 
-        numbers.append(Parameter(name, value, changed, **how))
+        numbers.append(Parameter(name, value, change, **how))
 
     def add_of_body(
         name: str, value: float, field: str, new: Callable[[float], Any], **how: bool

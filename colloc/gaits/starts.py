@@ -89,7 +89,7 @@ def travelling_wave(
         return wave
     stretched = np.abs(under_one_limit(angles, joint_limit)[0]).max(axis=1)
     proportions = np.abs(angles).max(axis=1) / np.maximum(stretched, np.finfo(float).tiny)
-    each = unit.mapped(np.diag(proportions))
+    each = unit.transform(np.diag(proportions))
     largest = largest_factor(body, joint_limit, each.angles(_PHASES))
     return each.grown(min(largest, _MOVING * least / each.shape_speed))
 
@@ -256,7 +256,7 @@ def to_body(gait: Any, body: Chain, other: Body, joint_limit: Limit = float(np.p
     covers, and all angles shrink until they are admissible."""
     matrix = other.from_chain(np.array(body.lengths))
     angles = matrix @ gait.angles(_PERIOD)
-    return gait.mapped(matrix * min(1.0, largest_factor(other, joint_limit, angles)))
+    return gait.transform(matrix * min(1.0, largest_factor(other, joint_limit, angles)))
 
 
 def to_class(

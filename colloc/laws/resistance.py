@@ -53,7 +53,6 @@ class Elliptic(Friction):
 
     @property
     def label(self) -> str:
-        """A short name with its numbers."""
         return f"elliptic {super().label}"
 
     def describe(self) -> str:

@@ -56,7 +56,6 @@ class Moving(NamedTuple):
     load: np.ndarray | None = None
 
     def at(self, chosen: np.ndarray) -> Moving:
-        """Some of the time points."""
         load = None if self.load is None else self.load[:, chosen]
         return self._replace(angles=self.angles[:, chosen], rates=self.rates[:, chosen], load=load)
 

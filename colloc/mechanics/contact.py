@@ -115,12 +115,12 @@ def crossing_sums(body: Any, angles: Array, i: int) -> tuple[Array, Array]:
     before, middle, after = body.lengths[i : i + 3]
     xp, a, b = namespace(angles), angles[i : i + 1, :], angles[i + 1 : i + 2, :]
 
-    def subtended(angle: Array, link: float) -> Array:
+    def chi(angle: Array, link: float) -> Array:
         if link == middle:
             return 0.5 * angle
         return xp.arctan2(link * xp.sin(angle), middle + link * xp.cos(angle))
 
-    return b + subtended(a, before), a + subtended(b, after)
+    return b + chi(a, before), a + chi(b, after)
 
 
 def intrusions(body: Any, angles: Array, first: int, second: int) -> tuple[Array, Array]:

@@ -102,8 +102,7 @@ class Instants:
     load: Array = None
     joint_map: JointMap | None = None
 
-    def chosen(self, which: np.ndarray) -> Instants:
-        """Some of them."""
+    def take(self, which: np.ndarray) -> Instants:
         names = ("angles", "rates", "z", "moments", "load")
         rows = {name: getattr(self, name) for name in names}
         some = {name: row[:, which] for name, row in rows.items() if row is not None}
@@ -160,7 +159,7 @@ class _OfInstants:
         return bool({"moment", "power", "idle"} & self._formula.names)
 
     @cached_property
-    def smoothed(self) -> bool:
+    def depends_on_delta(self) -> bool:
         """Whether it depends on delta by itself."""
         return "idle" in self._formula.names
 
@@ -390,13 +389,11 @@ class PathLimits:
         return np.where(np.isfinite(self.least)[:, None], np.abs(shares), shares)
 
     def in_units_of(self, unit: float) -> PathLimits:
-        """The limits for friction that is divided by a unit."""
-
-        def scaled(limit: PathLimit) -> PathLimit:
-            most = np.array(limit.most) / unit ** (limit.friction_degree or 0.0)
-            return replace(limit, most=tuple(most))
-
-        return PathLimits(tuple(map(scaled, self.each)))
+        sizes = (unit ** (limit.friction_degree or 0.0) for limit in self.each)
+        limits = zip(self.each, sizes, strict=True)
+        return PathLimits(
+            tuple(replace(limit, most=tuple(np.array(limit.most) / size)) for limit, size in limits)
+        )
 
 
 def stated_limit(stated: Any) -> PathLimit:
@@ -409,7 +406,6 @@ def stated_limit(stated: Any) -> PathLimit:
 
 
 def limits_of(asked: Iterable[PathLimit] | PathLimits, n_joint: int) -> PathLimits:
-    """Limits of a body with so many joints."""
     if isinstance(asked, PathLimits):
         return asked
     return PathLimits(tuple(each.on(n_joint) for each in asked))

@@ -108,14 +108,14 @@ def solve_balance(
             f"the shape coordinates of {type(body).__name__} are not its {body.n_link - 1} joints: "
             f"use its solve()."
         )
-    angles = _checked("angles", angles, body.n_joint)
+    angles = _check_array("angles", angles, body.n_joint)
     n_time = angles.shape[1]
-    rates = _checked("rates", rates, body.n_joint, n_time)
+    rates = _check_array("rates", rates, body.n_joint, n_time)
     check_finite(positive=True, delta=delta, tolerance=tolerance)
     if method not in METHODS:
         raise ProblemError(f"method must be one of {METHODS}, not {method!r}.")
-    start = None if start is None else _checked("start", start, 3, n_time)
-    load = None if load is None else _checked("load", load, 2, n_time)
+    start = None if start is None else _check_array("start", start, 3, n_time)
+    load = None if load is None else _check_array("load", load, 2, n_time)
     moving = Moving(body, body.law(friction), angles, rates, float(delta), load)
     search = _search if method == "auto" else _attempt
     z, residual, iterations, anchor, velocity = search(
@@ -125,7 +125,7 @@ def solve_balance(
     return BalanceSolution(z, residual, iterations, converged, anchor, velocity)
 
 
-def _checked(name: str, values: np.ndarray, rows: int, n_time: int | None = None) -> np.ndarray:
+def _check_array(name: str, values: np.ndarray, rows: int, n_time: int | None = None) -> np.ndarray:
     """Finite floats ``(rows, n_time)``, or a `ProblemError`."""
     try:
         array = np.atleast_2d(np.asarray(values))
@@ -164,7 +164,7 @@ def _search(
     def smoother(there: Moving) -> np.ndarray:
         return direct(there._replace(delta=_SMOOTHER * there.delta), None)
 
-    def followed(there: Moving, side: float) -> np.ndarray | None:
+    def continuation(there: Moving, side: float) -> np.ndarray | None:
         fastest, z = np.maximum(np.abs(there.rates).max(axis=0), there.delta), None
         for away in _AWAY:
             shift = side * away * there.delta / fastest**2 * there.rates
@@ -184,7 +184,7 @@ def _search(
         if method != "direct":
             # past a fold there is another balance, of which neighbouring times may know more
             for side in (-1.0, 1.0):
-                yield partial(followed, side=side), "natural"
+                yield partial(continuation, side=side), "natural"
             yield lambda there: None, method
 
     for guess, how in guesses():
@@ -317,7 +317,6 @@ def motion_and_derivatives(
 def _following(
     moving: Moving, solved: BalanceSolution, *, differentiated: bool = False
 ) -> tuple[BalancedMotion, np.ndarray]:
-    """The motion of a chain, and its derivatives if asked for."""
     body, friction, angles, rates, delta, load = moving
     n_time, columns = angles.shape[1], 2 * len(angles) + 2 * (load is not None)
     load = None if load is None else np.asarray(load, dtype=float)

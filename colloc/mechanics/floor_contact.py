@@ -425,12 +425,10 @@ class FloorContact:
         return FeetLaw(tuple(part.friction or friction for part in self.parts))
 
     def laws(self, friction: Law) -> tuple[Law, ...]:
-        """The law of every part."""
         law = self.law(friction)
         return law.laws if isinstance(law, FeetLaw) else (law,) * len(self.parts)
 
     def groups(self, friction: Law) -> list[Group]:
-        """The parts, by kind and law."""
         if friction not in self._groups:
             groups: dict[tuple[bool, Law], list[int]] = {}
             laws, feet = self.laws(friction), set(range(len(self.parts))) - set(self.pads)

@@ -66,24 +66,12 @@ _SLOW = (
 )
 
 _COULOMB = Friction()
-_switched_off = False
 
 
 def native_kernel(body: Any = None, friction: Law = _COULOMB) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do."""
     usable = body is None or (body.in_series and _parameters(body, friction))
-    return library() if usable and not _switched_off else None
-
-
-@contextlib.contextmanager
-def numpy_instead() -> Iterator[None]:
-    """A context in which NumPy does everything, on all threads: for comparison."""
-    global _switched_off
-    before, _switched_off = _switched_off, True
-    try:
-        yield
-    finally:
-        _switched_off = before
+    return library() if usable else None
 
 
 @cache

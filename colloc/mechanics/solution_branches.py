@@ -74,7 +74,7 @@ def all_balanced_velocities(
     if friction.associated:
         return Branches(*_solve(moving, np.zeros((1, 3, angles.shape[1])), "auto"))
     z, sign = _solve(moving, np.stack([moving.at_rest(link) for link in body.contact.rests]))
-    found = _distinct(z, sign, _speed(rates))
+    found = _distinct(z, sign, _largest_rate(rates))
     doubtful = np.flatnonzero((found.number > 1) | ~found.complete)
     if doubtful.size:
         # where a branch has just ended the solver may hang with a small residual; the solution
@@ -89,7 +89,7 @@ def all_balanced_velocities(
     return found
 
 
-def _speed(rates: np.ndarray) -> np.ndarray:
+def _largest_rate(rates: np.ndarray) -> np.ndarray:
     """Unit of velocities, ``(n_time,)``."""
     return np.maximum(np.abs(rates).max(axis=0), np.finfo(float).tiny)
 
@@ -107,7 +107,7 @@ def _solve(
     )
     z = np.stack(np.split(solved.z, count, axis=1))
     found = ((solved.residual <= _ACCEPTED) | solved.converged).reshape(count, -1)
-    repeated = _repeat(np.where(found[:, None], z, np.nan), _speed(moving.rates))
+    repeated = _repeat(np.where(found[:, None], z, np.nan), _largest_rate(moving.rates))
     new, sign = np.flatnonzero(found & ~repeated), np.zeros(solved.anchor.size)
     for link, chosen in groups(solved.anchor[new]):  # seen from what rests, which loses no digits
         at = new[chosen]
@@ -130,7 +130,7 @@ def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
     ]
     for root in z:
         softest = np.linalg.svd(_jacobian(moving, root))[2][:, 2].T
-        starts += [root + size * _speed(moving.rates) * softest for size in _BESIDE]
+        starts += [root + size * _largest_rate(moving.rates) * softest for size in _BESIDE]
     return np.stack(starts)
 
 
@@ -156,7 +156,7 @@ def _replace(
     everywhere: Branches, part: Moving, chosen: np.ndarray, z: np.ndarray, sign: np.ndarray
 ) -> Branches:
     """Branches with distinct ones of these at the chosen time points, `part`."""
-    there = _distinct(z, sign, _speed(part.rates))
+    there = _distinct(z, sign, _largest_rate(part.rates))
     more = max(0, len(there.z) - len(everywhere.z))
     z = np.pad(everywhere.z, ((0, more), (0, 0), (0, 0)), constant_values=np.nan)
     sign = np.pad(everywhere.sign, ((0, more), (0, 0)))

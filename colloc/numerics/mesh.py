@@ -89,8 +89,3 @@ class Mesh:
             sparse.csr_matrix((np.append(one, -one), states), shape=(row.size, n_state)),
             sparse.csr_matrix((weights.ravel(), rates), shape=(row.size, self.n_point)),
         )
-
-
-def uniform_mesh(scheme: Scheme, n: int, length: float) -> Mesh:
-    """`n` equal intervals on [0, length]."""
-    return Mesh(scheme, np.linspace(0.0, length, n + 1))

@@ -19,7 +19,7 @@ from typing import NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from colloc.numerics.conic import quadratic_step
-from colloc.system.interruption import interrupted, interruptible
+from colloc.system.interruption import interruptible, is_interrupted
 
 Value = TypeVar("Value")
 _NOWHERE = 1e3  # objective where the balance cannot be solved: a line search steps back from it
@@ -256,7 +256,7 @@ def minimize(
     gradient, slopes = program.gradient(here.v), program.row_slopes(here.v)
     count = 0
     with interruptible():
-        while count < iterations and not interrupted():
+        while count < iterations and not is_interrupted():
             count += 1
             limits = program.row_lower - here.rows, program.row_upper - here.rows
             step = quadratic_step(b, gradient, slopes, *limits, lower - here.v, upper - here.v)

@@ -29,9 +29,9 @@ from colloc.pictures.style import (
     SERIES,
     VERMILION,
     Picture,
+    figure_style,
     save,
     snapshot_colours,
-    styled,
 )
 from colloc.results.motion import foot_kinds, hinges, lab_feet, lab_outline, part_speeds
 from colloc.results.solution import SOLVED, Solution
@@ -62,7 +62,7 @@ class Panel(NamedTuple):
     draw: Callable[[Axes], object]
 
     def figure(self) -> Figure:
-        with styled(font_size=8):
+        with figure_style(font_size=8):
             figure = Figure(figsize=(self.width, self.height))
             self.draw(figure.add_subplot())
         return figure
@@ -77,7 +77,7 @@ def _plot(
 ) -> Any:
     """One panel on axes, or else a figure of all of them beside or below each other."""
     if ax is None:
-        with styled():
+        with figure_style():
             figure, rows = Picture(figsize=size), len(drawn) if stacked else 1
             grid = figure.subplots(rows, len(drawn) // rows, sharex=stacked, squeeze=False)
             for axes, draw in zip(grid.flat, drawn.values(), strict=True):
@@ -142,7 +142,7 @@ def plot_solution(solution: Solution, ax: Axes | None = None, panel: str = "gait
         ("sliding speeds (near δ: sticking)", _draw_speeds),
         (f"power; W = {solution.measured.work:.4f} (ticks: mesh)", _draw_power),
     )
-    with styled():
+    with figure_style():
         figure = Picture(figsize=(11, 8.2), layout="none")  # type: ignore[arg-type]
         colour = INK if solved else VERMILION
         figure.text(0.015, 0.985, headline, fontsize=11, va="top", color=colour)

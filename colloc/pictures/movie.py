@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from colloc.pictures.figure import BodyMarks, draw_shape_path
-from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, styled
+from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, figure_style
 from colloc.results.motion import (
     RigidMotion,
     SampledMotion,
@@ -111,7 +111,7 @@ def pictures(
     middle, half = 0.5 * (low + high), 0.5 * scale * np.array([share * width, tall])
     verdict = "" if solution.status == SOLVED else f"  ({solution.status})"
     title = f"{problem.name}   {problem.objective.name} {solution.measured.value:.4f}{verdict}"
-    with styled():
+    with figure_style():
         figure = Figure(figsize=(width / 100, height / 100), dpi=100)
         figure.set_layout_engine("none")
         canvas = FigureCanvasAgg(figure)

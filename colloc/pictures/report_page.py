@@ -23,7 +23,7 @@ from colloc.mechanics.inertia import GRAVITY
 from colloc.pictures import render
 from colloc.pictures.figure import Panel, mesh_errors, panels, robot_panels
 from colloc.pictures.movie import Frames, frames
-from colloc.pictures.style import INK, styled
+from colloc.pictures.style import INK, figure_style
 from colloc.results.motion import foot_kinds, hinges
 from colloc.results.robot import SLOW_ENOUGH, RobotSheet
 from colloc.results.solution import SOLVED, Solution
@@ -132,7 +132,7 @@ def _picture(
     right, top and bottom of its axes [percent], and limits of both."""
     text, figure = StringIO(), panel.figure()
     without = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with styled():
+    with figure_style():
         figure.savefig(text, format="svg", transparent=True, metadata=without)
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]

@@ -43,7 +43,7 @@ _STYLE: Any = {
 
 
 @contextmanager
-def styled(font_size: float = 9) -> Iterator[None]:
+def figure_style(font_size: float = 9) -> Iterator[None]:
     with style.context(
         ["default", {**_STYLE, "font.size": font_size, "axes.labelsize": font_size}]
     ):
@@ -55,16 +55,9 @@ class Picture(Figure):
 
     def _repr_png_(self) -> bytes:
         content = io.BytesIO()
-        with styled():
+        with figure_style():
             self.savefig(content, format="png")
         return content.getvalue()
-
-
-def subplots(
-    rows: int = 1, columns: int = 1, *, figsize: tuple[float, float], **options: Any
-) -> tuple[Figure, Any]:
-    figure = Figure(figsize=figsize)
-    return figure, figure.subplots(rows, columns, **options)
 
 
 def save(
@@ -73,7 +66,7 @@ def save(
     """Write ``STEM.KIND`` for every kind; returns the paths."""
     paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
     for path, kind in zip(paths, kinds, strict=True):
-        with replaced_file(path) as temporary, styled():
+        with replaced_file(path) as temporary, figure_style():
             metadata = {"CreationDate": None} if kind == "pdf" else None
             figure.savefig(temporary, format=kind, dpi=dpi, metadata=metadata)
         figure.set_layout_engine("none")  # the first layout holds for the others

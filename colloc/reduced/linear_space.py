@@ -180,6 +180,6 @@ class LinearSpace(SearchSpace):
         for each, which in placed:
             if which.size:
                 worst = following_instants(each, which, gait, self.mesh, self._limit)
-                each = each.moved(which, worst, self._gaits)
+                each = each.move(which, worst, self._gaits)
             found.append(each)
         return found

@@ -153,7 +153,7 @@ class ReducedMotion:
             y = self._torque_arguments(s)[:, point]
             slopes = inertial[1](y, delta).full().reshape(-1, len(y), n_row)
         else:
-            slopes = density_slopes(limits, self._instants(s).chosen(point))
+            slopes = density_slopes(limits, self._instants(s).take(point))
         at_points = np.zeros((n_row, slopes.shape[1], n_point))
         at_points[np.arange(n_row), :, point] = slopes[share, :, np.arange(n_row)]
         if inertial:

@@ -288,9 +288,9 @@ class ReducedProgram:
     def objective(self, v: np.ndarray) -> float:
         return -float(self.space.control.aims.objective(self.motion.values(v, self.delta)))
 
-    def stated(self, objective: float) -> float:
+    def value(self, objective: float) -> float:
         """Value of the problem's objective."""
-        return self.space.control.stated(-objective)
+        return self.space.control.unscale(-objective)
 
     def period(self, v: np.ndarray) -> dict[str, float]:
         """Totals of a period in the units of the problem."""

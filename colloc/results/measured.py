@@ -67,7 +67,7 @@ def measure(
     """Measure a path by replays at delta, delta/10 and delta/100, given the prescribed rotation;
     other arguments are those of the replay `run`."""
     replays: list[Replay] = []
-    smoothed = friction.regularised or any(each.smoothed for each in objective.integrals)
+    smoothed = friction.regularised or any(each.depends_on_delta for each in objective.integrals)
     for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
         how |= {"objective": objective, "turn": rotation or 0.0, "instants": instants}
         if replays:

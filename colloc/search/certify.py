@@ -162,7 +162,6 @@ def _rows(
     tolerance: float,
     claimed: float | None,
 ) -> Iterator[Row]:
-    """Checks of the replayed motion, in their order."""
     body, at, usual = problem.body, TOLERANCES, problem.body.defaults
     ends = path(np.array([0.0, 1.0]))[0]
     angles, rates = path(np.union1d(np.linspace(0.0, 1.0, 20001), breaks))

@@ -204,7 +204,7 @@ def _codec() -> Codec:
             known[key] = make(plain)
         return known[key]
 
-    def stated(problem: Problem) -> Any:
+    def problem_fields(problem: Problem) -> Any:
         plain = problem.to_dict()
         once(plain, lambda _: problem)  # from other processes it comes back
         return plain
@@ -217,7 +217,7 @@ def _codec() -> Codec:
 
     records = [Answer, Certificate, Check, Iterate, SecondOrder, Step]
     by_rule: dict[type, Any] = dict.fromkeys(SPACES, (arguments, space))
-    by_rule[Problem] = stated, lambda plain: once(plain, Problem.from_dict)
+    by_rule[Problem] = problem_fields, lambda plain: once(plain, Problem.from_dict)
     codec = Codec([*records, *gait_fields.GAITS, *gait_fields.CLASSES], by_rule)
     return codec
 
@@ -294,13 +294,13 @@ def active_run() -> Run:
     return _ACTIVE.get(_STORES_NOTHING)
 
 
-def checkpointed(stage: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+def checkpoint(stage: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """A function of values, called by place, whose results are stored in the run under way."""
 
     @functools.wraps(stage)
-    def stored(*arguments: Arguments.args, **named: Arguments.kwargs) -> Result:
+    def call(*arguments: Arguments.args, **named: Arguments.kwargs) -> Result:
         if named:
             raise TypeError(f"{stage.__name__} takes its arguments by place.")
         return active_run().result(stage, arguments)
 
-    return stored
+    return call

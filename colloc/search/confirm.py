@@ -25,7 +25,7 @@ from colloc.numerics.sqp import stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
 from colloc.results.answer import NOT_MEASURED, PRESCRIBED, REDUCED, Answer, SecondOrder, Step
-from colloc.search.checkpoint import active_run, checkpointed
+from colloc.search.checkpoint import active_run, checkpoint
 from colloc.search.ipopt import (
     NlpResult,
     Solver,
@@ -41,7 +41,7 @@ from colloc.transcription.layout import balanced_variables, distance_and_work, l
 from colloc.verification.refinement import plan_mesh
 
 
-@checkpointed
+@checkpoint
 def confirm(iterate: Iterate) -> Answer:
     """The gait as a point of the full program, with measured first- and second-order conditions;
     `message` says what holds where IPOPT does not confirm it."""
@@ -77,7 +77,7 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
     # gaits, and more than 30 lead away
     confirming: dict[str, object] = {"mu_init": 1e-10, "max_iter": 30}
     solver = Solver(program, confirming)
-    before = solver.measured(x, delta, *_multipliers(reduced, iterate.v, program))
+    before = solver.conditions_at(x, delta, *_multipliers(reduced, iterate.v, program))
     feasible = before.violation < TOLERANCES.violation
     # at the iterate, by the conditions of the reduced program
     here = replace(
@@ -195,7 +195,7 @@ def answer_of(program: FullProgram, result: NlpResult, delta: float) -> Answer:
         delta=delta,
         lam_x=result.lam_x[:n],
         lam_g=result.lam_g,
-        value=control.stated(-result.objective),
+        value=control.unscale(-result.objective),
         program=control.formulation,
     )
     return replace(answer, history=(answer.step,))
@@ -224,7 +224,7 @@ def second_order(space: SearchSpace, v: np.ndarray, delta: float, value: float) 
     far, problem = far_pairs(space.control.dynamics.body), space.control.problem
     program = ReducedProgram(space_of(problem, space.edges, space.scheme, far), delta)
     program.place_rows(v)
-    here, size = curvature(program, v), abs(value / program.stated(-1.0))
+    here, size = curvature(program, v), abs(value / program.value(-1.0))
     if not here.kkt_error < MEDIUM * size:  # elsewhere a curvature means nothing
         text = "not measured, where the gradient of the reduced program does not vanish"
         return replace(NOT_MEASURED, why_not=text)
@@ -266,7 +266,7 @@ def solve_directly(problem: Problem) -> Answer:
     return replace(answer, second_order=curved, history=history)
 
 
-@checkpointed
+@checkpoint
 def _solve_from(
     problem: Problem, parameters: np.ndarray, delta: float, edges: np.ndarray, scheme: str
 ) -> Answer:

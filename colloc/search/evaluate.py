@@ -201,7 +201,7 @@ def _errors_of_samples(
     aims, delta = control.aims, answer.problem.delta
     shapes = _Series(functions, answer.problem.joint_map)
     motion = ReducedMotion(control.dynamics, answer.mesh, shapes, aims.integrals)
-    scale = np.array([control.stated(1.0), 1 / control.unit, 1.0, control.unit])
+    scale = np.array([control.unscale(1.0), 1 / control.unit, 1.0, control.unit])
 
     def values(v: np.ndarray) -> np.ndarray:
         period = motion.values(v, delta)

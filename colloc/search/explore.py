@@ -34,7 +34,7 @@ from colloc.mechanics.chain import Chain
 from colloc.reduced.program import ReducedProgram
 from colloc.results.answer import Alternative
 from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
-from colloc.search.checkpoint import active_run, checkpointed
+from colloc.search.checkpoint import active_run, checkpoint
 from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
 from colloc.search.optimise import (
     delta_levels,
@@ -140,7 +140,7 @@ def explore(problem: Problem, starts: int | None = None) -> Exploration:
     return Exploration(optima, any_size.starts + large.starts, others, any_size.left)
 
 
-@checkpointed
+@checkpoint
 def farthest_distance(problem: Problem) -> float:
     """Distance of the farthest gait that a few starts lead to."""
     farthest = problem.with_(objective="distance", least_distance=None, shrinking=True)

@@ -19,7 +19,7 @@ from colloc.numerics.repeated import (
 )
 from colloc.numerics.sqp import keep_last
 from colloc.search.options import TOLERANCES
-from colloc.system.interruption import interrupted, interruptible
+from colloc.system.interruption import interruptible, is_interrupted
 from colloc.transcription.full_program import ACTUATORS, FullProgram
 
 _PUSHED = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
@@ -128,7 +128,7 @@ class Solver:
         ended = stats["return_status"], int(stats["iter_count"]), seconds
         return self._result(x, lam_x, lam_g, delta, lower, upper, ended)
 
-    def measured(
+    def conditions_at(
         self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
     ) -> NlpResult:
         """First-order conditions at x ``(n,)``, from multipliers of bounds and inequalities; those
@@ -230,7 +230,7 @@ class StopRequest(ca.Callback):
         return self._sparsity[ca.nlpsol_out(index)]
 
     def eval(self, arguments: list[ca.DM]) -> list[int]:
-        return [int(interrupted())]
+        return [int(is_interrupted())]
 
 
 _MEANING = {

@@ -58,8 +58,7 @@ class Iterate:
 
     @property
     def value(self) -> float:
-        """Value of the problem's objective."""
-        return self.space.control.stated(-self.objective)
+        return self.space.control.unscale(-self.objective)
 
     @property
     def optimal(self) -> bool:
@@ -98,7 +97,7 @@ def evaluate_at(
     step = Step(
         delta,
         space.mesh.n,
-        *(program.stated(objective), period["distance"], period["work"], conditions.kkt_error),
+        *(program.value(objective), period["distance"], period["work"], conditions.kkt_error),
         optimal=stationary,
         status=STATIONARY if stationary else NOT_STATIONARY,
         iterations=iterations,

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from colloc.mechanics.contact import Pairs, far_pairs, link_width, overlapping_p
 from colloc.numerics.sqp import Stationarity, minimize, stationarity, stationarity_around
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
-from colloc.search.checkpoint import active_run, checkpointed
+from colloc.search.checkpoint import active_run, checkpoint
 from colloc.search.iterate import STATIONARY, Iterate, evaluate_at, space_near, space_of
 from colloc.search.options import (
     FINE,
@@ -43,17 +42,11 @@ from colloc.system.errors import NotConvergedError
 from colloc.verification.refinement import AIM, MOST_POINTS, plan_mesh
 
 
-class Subproblem(NamedTuple):
-    v: np.ndarray
-    conditions: Stationarity
-    iterations: int
-    hessian: np.ndarray | None
-
-
 def solve_subproblems(
     program: ReducedProgram, v: np.ndarray, kkt: float, hessian: np.ndarray | None = None
-) -> Subproblem:
-    """Minimise from v ``(n,)``, updating the active instants, until nothing changes."""
+) -> tuple[np.ndarray, Stationarity, int, np.ndarray | None]:
+    """Minimise from v ``(n,)``, updating the active instants, until nothing changes; with the
+    number of iterations, and the Hessian if it is known."""
     iterations, violation, ends = 0, np.inf, [v]
     program.place_rows(v)
     for _ in range(max_rounds(kkt)):
@@ -79,10 +72,10 @@ def solve_subproblems(
         # the first round, with instants fixed, may leave an optimum that the second comes back to
         if len(ends) > 3 and np.abs(v - ends[-3]).max() < OPTIONS.stalled * step:
             break  # between two worst instants of one cell, where only a finer mesh helps
-    return Subproblem(v, conditions, iterations, hessian)
+    return v, conditions, iterations, hessian
 
 
-@checkpointed
+@checkpoint
 def optimise(
     space: SearchSpace,
     v: np.ndarray,
@@ -224,7 +217,7 @@ class _Projection:
         return np.vstack([self._program.row_slopes(v), 2 * self._area @ v])
 
 
-@checkpointed
+@checkpoint
 def project_to_zero_rotation(problem: Problem, gait: AnyGait, delta: float) -> AnyGait:
     """A gait near a given one that turns the body as prescribed and encloses the same area.
 

@@ -233,7 +233,7 @@ def _lagrangian(space: SearchSpace, v: np.ndarray, delta: float) -> Callable[[Pr
         values, low, high = (row[which] for row in rows)
         left = beyond(values, low, high, np.array([*on_rows.values()]))
         left += beyond(v, program.lower, program.upper, conditions.on_bounds)
-        return program.stated(program.objective(v)) + program.stated(1.0) * left
+        return program.value(program.objective(v)) + program.value(1.0) * left
 
     return lagrangian
 

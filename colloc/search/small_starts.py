@@ -25,13 +25,13 @@ from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import largest_factor, to_class
 from colloc.mechanics.law import rate_independent
-from colloc.search.checkpoint import checkpointed
+from colloc.search.checkpoint import checkpoint
 from colloc.system.errors import NotConvergedError
 
 _SHAPES = 60  # that are drawn, and directions of rates at each
 
 
-@checkpointed
+@checkpoint
 def small_loops(problem: Problem) -> list[AnyGait]:
     """Loops of the class that starts are drawn from, both ways round, best first; none where the
     pace matters."""

@@ -22,7 +22,7 @@ from colloc.results.answer import Answer
 from colloc.results.checks import BACKLASH, Certificate
 from colloc.results.solution import Solution
 from colloc.search.certify import certify, is_trivial
-from colloc.search.checkpoint import Progress, Run, active_run, checkpointed
+from colloc.search.checkpoint import Progress, Run, active_run, checkpoint
 from colloc.search.confirm import answer_of_iterate, confirm, solve_directly
 from colloc.search.explore import (
     Exploration,
@@ -223,7 +223,7 @@ def certify_answer(problem: Problem, answer: Answer) -> Solution:
     return solution
 
 
-@checkpointed
+@checkpoint
 def _certificate(answer: Answer) -> Certificate:
     if answer.optimal:
         return certify(answer)

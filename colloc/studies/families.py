@@ -132,7 +132,7 @@ def pareto_front(
     last = points - 1
     solutions: dict[int, Solution] = {}
 
-    def put(k: int, solution: Solution) -> None:
+    def keep(k: int, solution: Solution) -> None:
         value, before = solution.measured.value, solutions.get(k)
         if before is None or (solution.success, value) > (
             before.success,
@@ -151,7 +151,7 @@ def pareto_front(
         return solve_member(stated.with_(guess=begin.gait, delta_start=problem.delta), 1)
 
     for k, aim in zip((0, last), aims, strict=True):
-        put(k, solve_member(problem.with_(objective=aim), starts))
+        keep(k, solve_member(problem.with_(objective=aim), starts))
         if not solutions[k].success:
             raise ProblemError(
                 f"the gait of best {aim.name} is not certified, so there is no front: "
@@ -162,13 +162,13 @@ def pareto_front(
         levels = np.linspace(lowest, highest, points).tolist()
         backwards = range(last - 1, 0, -1)
         for k in backwards:
-            put(k, reach(1, levels[k], solutions[k + 1]))
+            keep(k, reach(1, levels[k], solutions[k + 1]))
         for k in range(1, last):
-            put(k, reach(1, levels[k], solutions[k - 1]))
+            keep(k, reach(1, levels[k], solutions[k - 1]))
         for k in backwards:  # a point that is dominated by the next one
             here, beside = (_measure(solutions[j], aims)[0][0] for j in (k, k + 1))
             if beside > here:
-                put(k, reach(1, levels[k], solutions[k + 1]))
+                keep(k, reach(1, levels[k], solutions[k + 1]))
     front, empty = _thin(solutions.values(), aims, last), {}
     for _ in range(2 * points):
         wide = {pair: size for pair, size in _wide(front, aims, last).items() if pair not in empty}
@@ -185,7 +185,7 @@ def pareto_front(
             except NotConvergedError as error:
                 failure = str(error)
                 continue
-            put(len(solutions), attempts[-1])
+            keep(len(solutions), attempts[-1])
             front = _thin(solutions.values(), aims, last)
         if attempts:
             failure = "" if any(each.success for each in attempts) else attempts[0].message

@@ -11,7 +11,7 @@ from colloc.dynamics.collocated import CollocatedPose
 from colloc.gaits.harmonic import Fourier
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
-from colloc.numerics.mesh import uniform_mesh
+from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.distinct_optima import phase_distance, reversed_in_time, swap_ends
 from colloc.smooth.smooth_body import SmoothBody
@@ -39,7 +39,7 @@ def wave_direction(gait: Fourier) -> float:
 
 def forward_share(gait: Fourier, body: Body, friction: Law) -> float:
     """Cosine between mean velocity and mean body axis: 1 is head first."""
-    mesh = uniform_mesh(scheme("gauss-1"), _INSTANTS, 1.0)
+    mesh = Mesh(scheme("gauss-1"), np.linspace(0.0, 1.0, _INSTANTS + 1))
     angles, rates = gait(mesh.times)
     z = body.solve(friction, angles, rates, _DELTA, tolerance=1e-8).z
     centre = body.sliding(friction, angles, rates, z, np.full((1, _INSTANTS), _DELTA)).centre
@@ -77,7 +77,7 @@ def gait_class(gait: Fourier, body: Body, friction: Law) -> dict[str, Any]:
         "bilateral": image is not None and phase_distance(gait, image) < close,
         "antipodal": bool(np.linalg.norm(even) < close),
         "retraced": phase_distance(gait, reversed_in_time(gait)) < close,
-        "wave": wave_direction(gait.mapped(bending)),
+        "wave": wave_direction(gait.transform(bending)),
         "forward": forward_share(gait, body, friction),
     }
     turns = 0 if kind["retraced"] else winding(gait)

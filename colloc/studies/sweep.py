@@ -69,13 +69,13 @@ class CellState:
         return best_attempt(self.attempts)
 
     @property
-    def tried(self) -> frozenset[str]:
+    def keys(self) -> frozenset[str]:
         return frozenset(a.key for a in self.attempts)
 
     @property
     def missing(self) -> bool:
         """True if the problem's own guess was not tried yet."""
-        return self.problem is not None and start_key(self.problem.guess) not in self.tried
+        return self.problem is not None and start_key(self.problem.guess) not in self.keys
 
     def add(self, visit: Visit) -> None:
         self.attempts += visit.attempts
@@ -204,7 +204,7 @@ class StudyRun:
             tuple(a.outcome.gait for a in others if a and a.gait_key not in state.scores),
             tuple(range(begin, begin + study.cold_starts)) if chunk else (),
             incumbent.outcome.value if incumbent else 0.0,
-            state.tried,
+            state.keys,
             *(study.warm_starts, study.time_limit, study.seed),
         )
 

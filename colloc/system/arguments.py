@@ -31,7 +31,7 @@ def named_arguments(cls: type[T]) -> type[T]:
     init, owner = cls.__init__, cls.__name__
 
     @functools.wraps(init)
-    def checked(self: T, *values: Any, **named: Any) -> None:
+    def init_checked(self: T, *values: Any, **named: Any) -> None:
         stated = _bind(owner, init, (self, *values), named)
         by_place = list(stated)[1 : len(values) + 1]
         del stated["self"]
@@ -60,7 +60,7 @@ def named_arguments(cls: type[T]) -> type[T]:
                 stacklevel=2,
             )
 
-    cls.__init__ = checked  # type: ignore[assignment]
+    cls.__init__ = init_checked  # type: ignore[assignment]
     return cls
 
 
@@ -68,11 +68,11 @@ def checked_arguments(function: Function) -> Function:
     """Make a function check its arguments against their annotations."""
 
     @functools.wraps(function)
-    def checked(*values: Any, **named: Any) -> Any:
+    def call(*values: Any, **named: Any) -> Any:
         _check_types(_types(function), _bind(function.__name__, function, values, named))
         return function(*values, **named)
 
-    return cast(Function, checked)
+    return cast(Function, call)
 
 
 def _bind(owner: str, function: Callable[..., Any], values: Any, named: Any) -> dict[str, Any]:

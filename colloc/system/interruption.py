@@ -1,7 +1,7 @@
 """Ctrl-C and time limits.
 
-CasADi would swallow a KeyboardInterrupt raised in a callback, so compiled solves poll `interrupted`
-between iterations. Nothing slow is imported here.
+CasADi would swallow a KeyboardInterrupt raised in a callback, so compiled solves poll
+`is_interrupted` between iterations. Nothing slow is imported here.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def end_at_once(number: int, frame: FrameType | None) -> None:
     os._exit(INTERRUPTED)
 
 
-def interrupted() -> bool:
+def is_interrupted() -> bool:
     """True if code within `interruptible` should stop: Ctrl-C, or the end of a `time_limit`."""
     return (_requested and _in_main_thread()) or time.monotonic() > _DEADLINE.get()
 
@@ -54,7 +54,7 @@ def _in_main_thread() -> bool:
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
     """Interrupt the block after so many seconds: as by Ctrl-C in the main thread within
-    `interruptible`; in other threads where the block polls `interrupted`."""
+    `interruptible`; in other threads where the block polls `is_interrupted`."""
     if seconds == float("inf"):
         yield
         return
@@ -108,7 +108,7 @@ def _unraisable(before: Callable[[Any], object]) -> Callable[[Any], object]:
 def interruptible(*, polled: bool = True) -> Iterator[None]:
     """End the block in KeyboardInterrupt if Ctrl-C came inside, also where it became another error.
 
-    With `polled` the block asks `interrupted` now and then: a first Ctrl-C raises at its end, a
+    With `polled` the block asks `is_interrupted` now and then: a first Ctrl-C raises at its end, a
     second one at once. Otherwise every Ctrl-C raises at once. Handlers of others are left alone.
     """
     global _requested, _polled

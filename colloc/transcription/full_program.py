@@ -283,7 +283,6 @@ class FullProgram(Program):
         return self.repeat(function, instances, [getattr(contact, name)[rows] for name in names])
 
     def _momenta_and_pace(self) -> list[np.ndarray]:
-        """Momenta and a free log period at the points."""
         free = int(self.dynamics.regime.free is not None)
         paces = np.repeat(self.layout.static[:free], self.mesh.n_point, axis=1)
         return [self.layout.momenta[:, self.sites], paces]
@@ -392,7 +391,6 @@ class FullProgram(Program):
         self._add_orientation(layout.spins[0])
 
     def _add_momenta(self, velocity: list[Any], loads: list[Any]) -> None:
-        """Momenta of the body and what changes them."""
         layout, pick, (state, rate) = self.layout, self.pick, self.mesh.integration()
         every = self._spread(np.ones((1, self.chain.n_link)))
         names = ("speed x", "speed y", "force x", "force y", "torque")

@@ -123,7 +123,7 @@ class Placed(NamedTuple):
         matrix = check.matrix(gaits, times, len(shapes), columns)
         return cls(check, cells, times, check.share(shapes), columns, matrix, offset)
 
-    def moved(self, which: np.ndarray, times: np.ndarray, gaits: Any) -> Placed:
+    def move(self, which: np.ndarray, times: np.ndarray, gaits: Any) -> Placed:
         """With some of the instants elsewhere in their cells, but for `times`."""
         matrix = self.matrix.copy()
         matrix[which] = self.check.matrix(gaits, times, len(self.offset), self.columns)

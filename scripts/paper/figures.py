@@ -33,6 +33,13 @@ _ENDS = {
 _MEASURES = (("distance", "d"), ("work", "W"), ("efficiency", r"$\lambda = d/W$"))
 
 
+def subplots(
+    rows: int = 1, columns: int = 1, *, figsize: tuple[float, float], **options: Any
+) -> tuple[Figure, Any]:
+    figure = Figure(figsize=figsize)
+    return figure, figure.subplots(rows, columns, **options)
+
+
 def letter(axes: Any, text: str) -> None:
     """A bold panel letter at the upper left, outside the axes."""
     place: Any = {"transform": axes.transAxes, "fontweight": "bold", "va": "bottom", "ha": "right"}
@@ -81,7 +88,7 @@ def link_fields(
 
 def figure_3(made: Arrays, folder: Path) -> list[Path]:
     """Force on a plate; velocities and forces on a three-link body, tail held and in balance."""
-    figure, axes = style.subplots(2, 3, figsize=(7.2, 3.6), height_ratios=(1, 1.2))
+    figure, axes = subplots(2, 3, figsize=(7.2, 3.6), height_ratios=(1, 1.2))
     for a, (mu_f, mu_t) in zip(axes[0], ((1, 1), (1, 2), (2, 1)), strict=True):
         # at 45 degrees, in uniform horizontal motion
         direction = np.exp(0.25j * np.pi)
@@ -113,7 +120,7 @@ def figure_3(made: Arrays, folder: Path) -> list[Path]:
 def figure_4(made: Arrays, folder: Path) -> list[Path]:
     """The flap body: the scene, its unbalanced force against velocity, and what delta gives."""
     body, flap = made["lengths"][:2]
-    figure, panels = style.subplots(1, 3, figsize=(7.4, 2.5), width_ratios=(1.1, 1, 1))
+    figure, panels = subplots(1, 3, figsize=(7.4, 2.5), width_ratios=(1.1, 1, 1))
     scene, force, speed = panels
     scene.plot([0, body], [0, 0], color=style.BLACK, lw=2.5)
     for sign in (1, -1):
@@ -166,7 +173,7 @@ def _wave(axes: Any, made: Arrays, name: str, what: str, drop: float = 0.0) -> N
 
 def figure_5(made: Arrays, folder: Path) -> list[Path]:
     """Waves with anisotropy 100."""
-    figure, axes = style.subplots(2, 1, figsize=(6.5, 4.6))
+    figure, axes = subplots(2, 1, figsize=(6.5, 4.6))
     _wave(axes[0], made, "5A", r"$\mu_f = \mu_b = 100\,\mu_t$: {}, {}")
     _wave(axes[1], made, "5B", r"$\mu_t = 100\,\mu_f$: {}, {}")
     return style.save(figure, folder / "figure-05-waves-anisotropic")
@@ -174,7 +181,7 @@ def figure_5(made: Arrays, folder: Path) -> list[Path]:
 
 def figure_6(made: Arrays, folder: Path) -> list[Path]:
     """The same waves, and a standing one, with isotropic friction."""
-    figure, axes = style.subplots(1, 3, figsize=(9, 5.2), width_ratios=(0.8, 1.2, 1.2))
+    figure, axes = subplots(1, 3, figsize=(9, 5.2), width_ratios=(0.8, 1.2, 1.2))
     for a, name, drop in zip(axes, ("6A", "6B", "6C"), (0.07, 0.12, 0.12), strict=True):
         _wave(a, made, name, "{}\n{}", drop)
     return style.save(figure, folder / "figure-06-waves-isotropic")
@@ -195,7 +202,7 @@ def _label_angles(axes: Any) -> None:
 
 def figure_7(made: Arrays, folder: Path) -> list[Path]:
     """Non-self-intersecting shapes, and the ellipses of the local maxima of the efficiency."""
-    figure, axes = style.subplots(figsize=(6.2, 4.4))
+    figure, axes = subplots(figsize=(6.2, 4.4))
     nodes, t = np.linspace(-np.pi, np.pi, 401), np.linspace(0, 1, 400)
     axes.contourf(nodes, nodes, _admissible_square(nodes).T, levels=[0.5, 1.5], colors=["#e4edf2"])
     colours = (style.BLUE, style.VERMILION, style.PURPLE, style.GREEN, style.ORANGE)
@@ -287,7 +294,7 @@ def figure_9(made: Arrays, folder: Path) -> list[Path]:
 def figure_10(made: Arrays, folder: Path) -> list[Path]:
     """Symmetric cases: fields, and what stays unbalanced as the middle link's one velocity
     varies."""
-    figure, axes = style.subplots(2, 3, figsize=(9.5, 5.4), height_ratios=(1.2, 1))
+    figure, axes = subplots(2, 3, figsize=(9.5, 5.4), height_ratios=(1.2, 1))
     _cases(axes[0], made, "symmetric", "ABC")
     V = made["symmetric_velocity"] * 1e3
     for a, name in zip(axes[1], "ABC", strict=True):
@@ -313,7 +320,7 @@ def _stars(axes: Any, gaits: np.ndarray) -> None:
 
 def figure_11(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
     """Distance, work and efficiency at A0 = 0."""
-    figure, axes = style.subplots(1, 3, figsize=(9.5, 3.1))
+    figure, axes = subplots(1, 3, figsize=(9.5, 3.1))
     for a, (key, name), text in zip(axes, _MEASURES, "ABC", strict=True):
         field = made[key].T
         drawn = a.contourf(made["A1"], made["B1"], field, levels=20, cmap=style.SEQUENTIAL)
@@ -338,7 +345,7 @@ def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
     margins = {"left": 0.05, "right": 0.92, "bottom": 0.1, "top": 0.93}
     margins |= {"hspace": 0.25, "wspace": 0.1}
     shared: Any = {"sharex": True, "sharey": True, "gridspec_kw": margins}
-    figure, axes = style.subplots(3, len(slices), figsize=(11, 4.8), **shared)
+    figure, axes = subplots(3, len(slices), figsize=(11, 4.8), **shared)
     figure.set_layout_engine("none")  # many axes of equal scale collapse under it
     for row, ((key, name), text) in enumerate(zip(_MEASURES, "ABC", strict=True)):
         levels = np.linspace(0, float(np.nanmax(made[key][slices])), 21)
@@ -364,7 +371,7 @@ def figure_12_maps(made: Arrays, found: Arrays, folder: Path) -> list[Path]:
 def figure_12_motion(made: Arrays, folder: Path) -> list[Path]:
     """The two best gaits: speeds of link ends, snapshots in the body's own place but spread out,
     and where they are in the lab frame, darker later."""
-    figure, axes = style.subplots(2, 3, figsize=(10, 5.4), width_ratios=(1, 1.5, 1))
+    figure, axes = subplots(2, 3, figsize=(10, 5.4), width_ratios=(1, 1.5, 1))
     for (speeds, motion, lab), name, after, until, times in zip(
         axes, "DF", "EG", (0.5, 1.0), ((0, 0.12, 0.38, 0.5, 1), (0, 0.2, 0.5, 0.8, 1)), strict=True
     ):
@@ -472,7 +479,7 @@ FIGURES: tuple[tuple[Callable[..., list[Path]], tuple[str, ...]], ...] = (
 def draw_all(study: PaperStudy, folder: Path) -> list[Path]:
     """Draw all figures whose parts are finished, and return the files written."""
     paths: list[Path] = []
-    with style.styled():
+    with style.figure_style():
         for draw, parts in FIGURES:
             if all(study.finished(part) for part in parts):
                 paths += draw(*(study.arrays(part) for part in parts), folder)

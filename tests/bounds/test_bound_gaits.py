@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction
-from colloc.bounds.motions import CoulombMotion, admissible, balanced_motion
+from colloc.bounds.motions import CoulombMotion, admissible
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
-from research.small_gaits import best_small_gait, small_gait
+from research.small_gaits import balanced_motion, best_small_gait, small_gait
 from tests.shared.laws import coulomb
 
 ODD = Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)

@@ -23,7 +23,6 @@ from colloc import (
 from colloc.bounds.motions import (
     CoulombMotion,
     Domain,
-    balanced_motion,
     fundamental,
     two_resting,
 )
@@ -32,7 +31,7 @@ from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline, large
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, smallest_maximum
 from colloc.mechanics.balance import instant, total_power
 from colloc.system.errors import ProblemError, StoreError
-from research.small_gaits import small_gait
+from research.small_gaits import balanced_motion, small_gait
 from tests.shared.laws import coulomb
 
 FRICTIONS = [(1.0, 1.0, 1.0), (3.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0)]

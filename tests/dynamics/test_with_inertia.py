@@ -11,11 +11,11 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.dynamics.dynamics import Shapes
 from colloc.gaits.objective import objective_from
 from colloc.mechanics.inertia import momentum_rates
-from colloc.mechanics.native_kernel import numpy_instead
 from colloc.pictures.movie import pictures
 from colloc.reduced.program import ReducedProgram
 from colloc.search.iterate import space_near
 from colloc.verification.mesh_error import mesh_error
+from tests.shared.without_kernel import numpy_instead
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 ROUND = colloc.ellipse(A0=0, A1=2.5, B1=1.3)

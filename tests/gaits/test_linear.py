@@ -63,7 +63,7 @@ def test_members_have_the_symmetry_of_their_class_and_are_found_again(symmetry, 
         again = gait_class.member(gait_class.parameters(gait), n_joint)
         np.testing.assert_allclose(again.table, gait.table, rtol=0, atol=1e-10)
         # as anybody's gait: by its angles alone
-        again = gait_class.member(gait_class.parameters(gait.mapped(np.eye(n_joint))), n_joint)
+        again = gait_class.member(gait_class.parameters(gait.transform(np.eye(n_joint))), n_joint)
         np.testing.assert_allclose(again.angles(T), gait.angles(T), atol=1e-4)
 
 

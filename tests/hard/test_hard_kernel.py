@@ -7,9 +7,10 @@ from cases import ANGLES, COEFFICIENTS, DELTAS, RATES, SPEED
 
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.balance import instant, net_force, total_power
-from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.native_kernel import native_kernel
 from research.guarantee.loaded_balance import loaded_balance
 from tests.shared.laws import coulomb
+from tests.shared.without_kernel import numpy_instead
 
 LAWS = [(1.0, 1.0, 1.0), (1.7, 1.0, 1.3), (10.0, 1.0, 1.0), (0.5, 1.0, 5.0)]
 

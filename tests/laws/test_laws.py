@@ -11,9 +11,10 @@ from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.friction import ClosedForm, line_integrals
 from colloc.mechanics.law import Law
-from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.native_kernel import native_kernel
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.smooth_body import accurate_motion
+from tests.shared.without_kernel import numpy_instead
 
 LENGTHS = Chain().length_column()
 WEAKER = "/speed * (1 + 0.5*exp(-speed))"

@@ -21,7 +21,8 @@ from colloc import (
 from colloc.mechanics.balance import balance_jacobian, instant, joint_moments, largest_moments
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import chain_motion, motion_and_derivatives
-from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.native_kernel import native_kernel
+from tests.shared.without_kernel import numpy_instead
 
 LENGTHS, SKEW = (0.3, 0.45, 0.25), Friction(mu_t=0.5, mu_f=1, mu_b=2)
 ELLIPTIC = Elliptic(mu_t=2, mu_f=1, mu_b=1.5)

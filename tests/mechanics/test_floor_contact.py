@@ -7,8 +7,9 @@ from shared.instants import random_instants
 from shared.points import wrench
 
 from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Viscous, Wheel, solve_balance
-from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.native_kernel import native_kernel
 from tests.mechanics.test_chain_mechanics import BODIES, LAWS, LENGTHS, STANDS, each_law
+from tests.shared.without_kernel import numpy_instead
 
 AHEAD, BACK = Friction(mu_t=1.0, mu_f=0.2, mu_b=0.9), Friction(mu_t=1.0, mu_f=0.9, mu_b=0.2)
 EQUAL, STILL = Friction(), np.zeros((2, 1))

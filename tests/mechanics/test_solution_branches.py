@@ -6,9 +6,9 @@ import pytest
 from colloc import Chain, Friction, ellipse, solve_balance
 from colloc.mechanics import solution_branches
 from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.native_kernel import numpy_instead
 from colloc.mechanics.solution_branches import DISTINCT, all_balanced_velocities
 from tests.shared.laws import coulomb
+from tests.shared.without_kernel import numpy_instead
 
 PRINTED = (np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]]))
 STEEP = Friction(mu_t=1, mu_f=0.01, mu_b=100)

@@ -31,10 +31,10 @@ from colloc import (
     Wheel,
     ellipse,
 )
-from colloc.mechanics.native_kernel import numpy_instead
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.balance import solve_smooth
 from colloc.verification.trajectory import plan_trajectory
+from tests.shared.without_kernel import numpy_instead
 
 KNOWN = Path(__file__).with_name("known.json")
 EQUAL, UNEQUAL = Friction(), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)

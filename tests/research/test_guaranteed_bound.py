@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shared.address_sanitizer import stays_within_its_arrays
 
-from colloc.bounds.motions import CoulombMotion, Domain, balanced_motion
+from colloc.bounds.motions import CoulombMotion, Domain
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.laws.resistance import Elliptic
@@ -16,7 +16,7 @@ from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.friction import Friction
-from colloc.mechanics.native_kernel import native_kernel, numpy_instead
+from colloc.mechanics.native_kernel import native_kernel
 from colloc.system.errors import ProblemError
 from research.guarantee import enclosure, guaranteed
 from research.guarantee.enclosure import (
@@ -31,6 +31,8 @@ from research.guarantee.enclosure import (
 from research.guarantee.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
 from research.guarantee.loaded_balance import loaded_balance
 from research.guarantee.potential_range import PotentialRange, turned
+from research.small_gaits import balanced_motion
+from tests.shared.without_kernel import numpy_instead
 
 BODY, UNIT = Chain(), Friction()
 KAPPA = np.sqrt(2) - 1

@@ -118,7 +118,7 @@ def test_motors_may_brake_harder_than_they_may_drive_but_turn_no_harder_either_w
     angles, rates = random_instants(200)
     now = Instants(BODY, LAW, angles, rates, 1e-3, z=BODY.solve(LAW, angles, rates, 1e-3).z)
     joint, instant = np.unravel_index(now.power.argmin(), now.power.shape)
-    brakes = now.chosen(np.array([instant]))
+    brakes = now.take(np.array([instant]))
     power, torque = np.full(2, 100.0), np.full(2, 100.0)
     power[joint], torque[joint] = -0.5 * brakes.power[joint, 0], 0.5 * abs(brakes.moment[joint, 0])
     for limit, share in (({"power_limit": (*power,)}, 1.0), ({"torque_limit": (*torque,)}, 2.0)):

@@ -12,7 +12,7 @@ import pytest
 
 from colloc import Harmonic, Problem, ellipse
 from colloc.search.ipopt import Solver
-from colloc.system.interruption import clear_interrupt, interrupted, interruptible, time_limit
+from colloc.system.interruption import clear_interrupt, interruptible, is_interrupted, time_limit
 from colloc.transcription.velocity_map import BalancedVelocity
 from tests.shared.stages import program_of
 
@@ -22,7 +22,7 @@ def pressed(times, seen, **options):
         for _ in range(times):
             seen["pressed"] += 1
             signal.raise_signal(signal.SIGINT)
-        seen["known"] = interrupted()
+        seen["known"] = is_interrupted()
 
 
 def press(times=1, **options):
@@ -121,7 +121,7 @@ def test_a_time_limit_ends_a_block_as_ctrl_c_does():
     assert time.monotonic() - begin < 5
     clear_interrupt()
     with interruptible():
-        assert not interrupted()
+        assert not is_interrupted()
 
 
 def test_in_another_thread_a_time_limit_ends_what_asks_for_it():
@@ -130,7 +130,7 @@ def test_in_another_thread_a_time_limit_ends_what_asks_for_it():
     def work():
         try:
             with time_limit(0.05), interruptible():
-                while not interrupted():
+                while not is_interrupted():
                     time.sleep(0.01)
         except KeyboardInterrupt:
             ended.append(True)

@@ -20,7 +20,7 @@ from colloc import (
 from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics.balance import instant
 from colloc.mechanics.contact import crossing_depth
-from colloc.numerics.mesh import Mesh, uniform_mesh
+from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.search import optimise as refine
 from colloc.verification import refinement
@@ -130,7 +130,7 @@ def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
 @each_friction
 def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     stated = problem(friction=friction)
-    fine = fine_of(stated, uniform_mesh(scheme("gauss-3"), 20, 0.5))
+    fine = fine_of(stated, Mesh(scheme("gauss-3"), np.linspace(0.0, 0.5, 21)))
     kinks = kink_phases(stated.body, friction, GAIT, DELTA, fine)
     assert 4 <= kinks.size <= 24
     # reversing the motion of the body about the middle of the half period maps kinks to kinks (A0 =
