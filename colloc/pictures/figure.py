@@ -34,6 +34,7 @@ from colloc.pictures.style import (
     snapshot_colours,
 )
 from colloc.results.motion import foot_kinds, hinges, lab_feet, lab_outline, part_speeds
+from colloc.results.robot import drawn_units, in_si
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import ProblemError
 from colloc.verification.mesh_error import mesh_error
@@ -129,6 +130,9 @@ def plot_solution(solution: Solution, ax: Axes | None = None, panel: str = "gait
         return _plot({"gait": lambda axes: draw_gait(axes, solution), **named}, ax, panel)
     problem, solved = solution.problem, solution.status == SOLVED
     more = [text for text in (problem.scene, solution.turning) if text]
+    if si := in_si(solution):
+        energy = f", {si['energy_J_per_m']:.3g} J/m" if "energy_J_per_m" in si else ""
+        more = [f"{100 * si['speed_m_per_s']:.3g} cm/s{energy}, {si['period_s']:.3g} s a cycle"]
     headline = (
         f"{problem.name}: {problem.objective.label} = {solution.measured.value:.5f}   "
         f"{problem.law.label},  δ = {solution.answer.delta:.0e}"
@@ -136,11 +140,14 @@ def plot_solution(solution: Solution, ax: Axes | None = None, panel: str = "gait
         f"class: {';  '.join([problem.gait.describe(), *more])}"
     )
     strip = "one period: phase, and below it the displacement of the centre (disc: head)"
+    if si:
+        strip = "one cycle: time [s], and below it the displacement of the centre [cm] (disc: head)"
+    work = si.get("friction_work_per_cycle_J", solution.measured.work)
     drawn = (
         ("in the lab (black: at the end)", draw_lab),
         ("shape space (disc: t = 0)" if _is_planar(solution) else "shape", draw_gait),
         ("sliding speeds (near δ: sticking)", _draw_speeds),
-        (f"power; W = {solution.measured.work:.4f} (ticks: mesh)", _draw_power),
+        (f"power; W = {work:.4g}{' J' * bool(si)} (ticks: mesh)", _draw_power),
     )
     with figure_style():
         figure = Picture(figsize=(11, 8.2), layout="none")  # type: ignore[arg-type]
@@ -233,6 +240,7 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
     """The body at equal steps of a period, with the phase and the displacement of its centre."""
     body, motion = solution.problem.body, solution.sample(np.linspace(0.0, 1.0, count))
     ends, feet, held = lab_outline(body, motion), lab_feet(body, motion), solution.holding(motion)
+    units = drawn_units(solution)
     rise = float(np.ptp(ends[1]))
     higher = max(1, round(_SEEN / rise)) if 0 < rise < _FLAT else 1
     x, y = ends[0], higher * ends[1]
@@ -245,8 +253,10 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
         at = (ends[:, :, k].T, motion.centre[:, k], feet[..., k].T)
         placed = [(scale * points + place).T for points in at]
         BodyMarks(axes, body, colour, (2.4, 3.5, 5, 6, 4.5)).place(placed, held[:, k])
-        come = f"{round(float(motion.centre[0, k]), 2) + 0.0:.2f}".replace("-", "−")
-        for text, shade, line in ((f"{motion.t[k]:.2g}", GREY, -3), (come, VERMILION, -13)):
+        way = units.length * float(motion.centre[0, k])
+        come = f"{round(way, 2) + 0.0:.{2 if units.length == 1 else 1}f}".replace("-", "−")
+        phase = f"{units.time * motion.t[k]:.{2 if units.time == 1 else 3}g}"
+        for text, shade, line in ((phase, GREY, -3), (come, VERMILION, -13)):
             axes.annotate(
                 text, (middle[k], low), (0, line), xycoords="data", textcoords="offset points",
                 ha="center", va="top", fontsize=7, color=shade,
@@ -283,8 +293,29 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
     axes.autoscale_view()
     axes.set_aspect("equal", "datalim")
     counted = f"{periods} period{'s' if periods > 1 else ''}"
-    axes.set(xlabel=f"x  [body lengths],  {counted}", ylabel="y  [body lengths]")
+    units = drawn_units(solution)
+    axes.set(xlabel=f"x  [{units.of_length}],  {counted}", ylabel=f"y  [{units.of_length}]")
+    _label_in(units.length, axes.xaxis, axes.yaxis)
     _draw_key(axes, more=marks.key())
+
+
+class _Ticks(MaxNLocator):
+    """Round numbers of another unit."""
+
+    def __init__(self, size: float) -> None:
+        super().__init__(7, steps=[1, 2, 5, 10])
+        self._size = size
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:
+        ticks = super().tick_values(self._size * vmin, self._size * vmax)
+        return np.array(ticks) / self._size
+
+
+def _label_in(size: float, *axes: Any) -> None:
+    """Label axes in a unit of which there are `size` in the data's."""
+    for axis in axes if size != 1.0 else ():
+        axis.set_major_locator(_Ticks(size))
+        axis.set_major_formatter(lambda x, _: f"{round(size * x, 9):g}".replace("-", "−"))
 
 
 def _is_planar(solution: Solution) -> bool:
@@ -297,8 +328,11 @@ def draw_gait(axes: Axes, solution: Solution) -> None:
 
 
 def _draw_angles(axes: Axes, solution: Solution) -> None:
-    names, angles = solution.problem.body.defaults, solution.gait.angles(_T)
-    _draw_series(axes, _T, angles, names.coordinate, ylabel=f"{names.quantity}  [rad]")
+    names, units = solution.problem.body.defaults, drawn_units(solution)
+    angles, ylabel = solution.gait.angles(_T), f"{names.quantity}  [{units.of_angle}]"
+    _draw_series(axes, _T, angles, names.coordinate, xlabel=units.of_time, ylabel=ylabel)
+    _label_in(units.time, axes.xaxis)
+    _label_in(units.angle, axes.yaxis)
 
 
 def forbidden(
@@ -338,25 +372,34 @@ def draw_shape_path(axes: Axes, solution: Solution, first: int = 0) -> None:
     axes.annotate("", (q[0, at + 2], q[1, at + 2]), (q[0, at], q[1, at]), arrowprops=arrow)
     middle, half = np.zeros(2), 1.02 * np.pi
     extent = float(np.ptp(angles, axis=1).max())
+    units, names = drawn_units(solution), ["−π", "−π/2", "0", "π/2", "π"]
+    if units.angle != 1.0:
+        names = ["−180", "−90", "0", "90", "180"]
     if extent < _SMALL:
         middle, half = 0.5 * (q.min(axis=1) + q.max(axis=1)), 0.6 * max(extent, 0.05)
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(MaxNLocator(5))
+        _label_in(units.angle, axes.xaxis, axes.yaxis)
     else:
         for axis in (axes.xaxis, axes.yaxis):
-            axis.set_ticks(np.pi * np.linspace(-1, 1, 5), ["−π", "−π/2", "0", "π/2", "π"])
+            axis.set_ticks(np.pi * np.linspace(-1, 1, 5), names)
     (left, low), (right, high) = middle - half, middle + half
     axes.set(xlim=(left, right), ylim=(low, high), aspect="equal")
     what = problem.body.defaults.quantity
-    axes.set(xlabel=f"{what} {first + 1}  [rad]", ylabel=f"{what} {second + 1}  [rad]")
+    xlabel, ylabel = (f"{what} {k + 1}  [{units.of_angle}]" for k in (first, second))
+    axes.set(xlabel=xlabel, ylabel=ylabel)
 
 
 def _draw_speeds(axes: Axes, solution: Solution) -> None:
     """Sliding speeds over a period on a logarithmic scale, with delta: below it, sticking."""
     motion, delta = solution.sample(_T), solution.delta_per_period
     part, speed = part_speeds(solution.problem.body, motion)
-    speed = np.maximum(speed, 0.1 * delta)
-    _draw_series(axes, _T, speed, part, ylabel=f"{part} speed  [1/period]")
+    units = drawn_units(solution)
+    delta *= units.speed
+    speed = np.maximum(units.speed * speed, 0.1 * delta)
+    ylabel = f"{part} speed  [{units.of_speed}]"
+    _draw_series(axes, _T, speed, part, xlabel=units.of_time, ylabel=ylabel)
+    _label_in(units.time, axes.xaxis)
     axes.axhline(delta, color=GREY, lw=1, ls=":")
     axes.annotate("δ", (1.0, delta), (3, 0), textcoords="offset points", color=GREY, va="center")
     _set_log(axes, "y", (0.5 * float(min(speed.min(), delta)), 2 * float(speed.max())))
@@ -364,8 +407,11 @@ def _draw_speeds(axes: Axes, solution: Solution) -> None:
 
 def _draw_power(axes: Axes, solution: Solution) -> None:
     axes.plot(_T, solution.power(solution.sample(_T)), color=BLUE, lw=1.5)
-    axes.set(xlim=(0, 1), xlabel="phase t", ylabel="power  [weight·length/period]")
+    units = drawn_units(solution)
+    axes.set(xlim=(0, 1), xlabel=units.of_time, ylabel=f"power  [{units.of_power}]")
     axes.set_ylim(bottom=0)
+    _label_in(units.time, axes.xaxis)
+    _label_in(units.power, axes.yaxis)
     _draw_mesh_ticks(axes, solution.answer.edges)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -142,6 +142,35 @@ def period_of(solution: Solution) -> float:
     if isinstance(robot.period, tuple):
         return math.sqrt(robot.length / (pressing(solution, robot.gravity) * solution.froude))
     return float(robot.period)
+
+
+class Units(NamedTuple):
+    """Sizes of units that a solution is drawn in, and their names."""
+
+    length: float = 1.0
+    of_length: str = "body lengths"
+    time: float = 1.0
+    of_time: str = "phase t"
+    angle: float = 1.0
+    of_angle: str = "rad"
+    of_speed: str = "1/period"
+    power: float = 1.0
+    of_power: str = "weight·length/period"
+
+    @property
+    def speed(self) -> float:
+        return self.length / self.time
+
+
+def drawn_units(solution: Solution) -> Units:
+    """Centimetres, seconds, degrees and watts of a robot; else those without dimensions."""
+    if (robot := solution.problem.robot) is None:
+        return Units()
+    period, newtons = period_of(solution), robot.mass * pressing(solution, robot.gravity)
+    return Units(
+        *(100 * robot.length, "cm", period, "time  [s]", math.degrees(1.0), "deg", "cm/s"),
+        *(newtons * robot.length / period, "W"),
+    )
 
 
 def in_si(solution: Solution) -> dict[str, float]:

@@ -118,3 +118,17 @@ def test_a_gait_below_the_play_of_the_joints_is_no_answer(slow_robot, over_swing
     robot = replace(SLOW, backlash=over_swing * slow_robot.swings.max())
     answer = replace(slow_robot.answer, problem=slow_robot.problem.with_(robot=robot))
     assert [check.name for check in colloc.certify(answer).failures] == failures
+
+
+def test_a_figure_of_a_robot_has_its_units(slow_robot):
+    figure = slow_robot.plot()
+    figure.draw_without_rendering()
+    lab, angles, speeds, power = figure.axes[1:]
+    assert "[cm]" in lab.get_xlabel()
+    assert [axes.get_xlabel() for axes in (angles, speeds, power)] == 3 * ["time  [s]"]
+    # a label is the number of its place, in the other unit
+    for axis, unit in ((lab.xaxis, 62.0), (angles.yaxis, np.degrees(1)), (power.xaxis, 600.0)):
+        places = zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)
+        for place, label in places:
+            number = float(label.get_text().replace("−", "-"))
+            assert number == pytest.approx(unit * place, abs=1e-6 * unit)
