@@ -199,7 +199,7 @@ def of_torques(body: Chain, friction: Law, formula: Quantity | PathLimits) -> An
     q, r, accelerations, momenta, froude = parts = [ca.SX.sym(*each) for each in sizes]
     y, delta = ca.vertcat(*parts), ca.SX.sym("delta")
     moments = torque_function(body, friction)(q, r, accelerations, momenta, delta, froude)
-    out = formula.at(Instants(body, friction, q, r, delta, moments=moments))
+    out = formula.at(Instants(body, friction, q, r, delta, moments=moments, froude=froude))
     slope = ca.vec(ca.densify(ca.jacobian(out, y).T))
     values = ca.Function("values", [y, delta], [out], {"cse": True})
     return values, ca.Function("slopes", [y, delta], [slope], {"cse": True})

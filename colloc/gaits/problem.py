@@ -345,6 +345,8 @@ class Problem:
                 f"{forced[0]} needs the forces on the body's parts: a chain, and the formulation "
                 f"{FULL!r}."
             )
+        if any(x.needs_pace for x in (*self.limits, *self.integrals)) and not self.regime.free:
+            raise ProblemError("the speed of a joint is one of a free pace, froude=Free(...).")
         most = float(np.linalg.norm(self.largest_speeds)) if self.speed_limit else np.inf
         if most <= (least := 2 * np.pi * self.smallest_shape_speed):
             raise ProblemError(
@@ -409,7 +411,8 @@ class Problem:
         """Limits of motors, joint by joint, and `limits`."""
         n = self.n_motor
         motors = torque_and_power(of_each(self.torque_limit, n), of_each(self.power_limit, n))
-        return PathLimits((*motors, *(each.on(n) for each in self.limits)))
+        speeds = self.robot.speed_limits(self.grade, n) if self.robot else ()
+        return PathLimits((*motors, *speeds, *(each.on(n) for each in self.limits)))
 
     @property
     def largest_speeds(self) -> tuple[float, ...]:

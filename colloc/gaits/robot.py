@@ -15,6 +15,7 @@ import numpy as np
 
 from colloc.gaits.objective import DRIVEN, Objective
 from colloc.gaits.regime import Free
+from colloc.mechanics.densities import PathLimit
 from colloc.mechanics.inertia import GRAVITY
 from colloc.system.arguments import is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
@@ -95,15 +96,17 @@ class Robot:
                 f"length={self.length:g} is {self.length:g} metres, and at most {_LONGEST:g} are "
                 f"taken. If these are centimetres, write length={self.length / 100:g}."
             )
-        if isinstance(self.period, tuple) and self.max_speed is not None:
-            raise ProblemError(
-                "a period that is sought cannot be limited by max_speed yet: give the shortest "
-                "period that the motors allow, and leave max_speed out."
-            )
 
     def pressing(self, grade: float) -> float:
         """Component of gravity normal to the ground [m/s^2]."""
         return self.gravity * math.cos(math.atan(grade))
+
+    def speed_limits(self, grade: float, n_joint: int) -> tuple[PathLimit, ...]:
+        """Limits of the joints' speeds where the period is sought with the gait."""
+        if not isinstance(self.period, tuple) or self.max_speed is None:
+            return ()
+        root = math.sqrt(self.length / self.pressing(grade))
+        return (PathLimit(SPEED_OF_ROBOT, "speed", _scaled(self.max_speed, root)).on(n_joint),)
 
     def derived(self, grade: float, smallest_friction: float) -> dict[str, Any]:
         """The objective and the fields `DERIVED` of a problem on such a grade; without inertia if
@@ -125,11 +128,12 @@ class Robot:
         return {
             "objective": Objective(battery, name=BATTERY) if idle else DRIVEN,
             "froude": froude,
-            "speed_limit": _scaled(self.max_speed, times[0]),
+            "speed_limit": None if len(times) == 2 else _scaled(self.max_speed, times[0]),
             "torque_limit": _scaled(self.max_torque, 1.0 / unit),
         }
 
 
+SPEED_OF_ROBOT = "joint speed of the robot"
 BATTERY = "battery efficiency"
 """Distance over the energy that a battery gives: work of motors that brake without regeneration,
 and idle power; in weights times length."""

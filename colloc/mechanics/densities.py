@@ -26,6 +26,7 @@ from colloc.system.errors import ProblemError
 VARIABLES = {
     "angle": "of every joint [rad]",
     "rate": "of every joint [rad per period]",
+    "speed": "of every joint at a free pace [rad per sqrt(length / gravity)]",
     "moment": "that the actuator of every joint exerts [weight x body length]",
     "power": "that it delivers, moment times rate",
     "idle": "power at an instant below which regularised friction does not tell who drives whom: "
@@ -33,7 +34,7 @@ VARIABLES = {
 }
 SUMMED = (*FUNCTIONS, "sum")
 """Functions of a formula; ``sum`` is over the joints."""
-_WITH_PACE, _WITH_FRICTION = ("rate", "power", "idle"), ("moment", "power", "idle")
+_WITH_PACE, _WITH_FRICTION = ("rate", "speed", "power", "idle"), ("moment", "power", "idle")
 _DOUBLINGS = -20, 1, 4, 20
 """Powers of two by which a formula's degree is found, beyond whatever scale it has of its own."""
 _TAKEN = ("distance", "work", "rotation", "across", "period", "efficiency", "value", "instants")
@@ -101,6 +102,7 @@ class Instants:
     unit: float = 1.0
     load: Array = None
     joint_map: JointMap | None = None
+    froude: Array = None  # in the unit of time of the rates
 
     def take(self, which: np.ndarray) -> Instants:
         names = ("angles", "rates", "z", "moments", "load")
@@ -132,6 +134,10 @@ class Instants:
         return self.unit * rates
 
     @property
+    def speed(self) -> Array:
+        return self.rates * self.froude**0.5
+
+    @property
     def idle(self) -> Array:
         degree = self.friction.degree or 0.0
         return self.unit * self.friction.largest * self.delta ** (1.0 + degree)
@@ -141,7 +147,8 @@ def sample() -> dict[str, Any]:
     """Five time points of three joints at which formulas are tried."""
     rng = np.random.default_rng(0)
     angle, rate, moment = rng.uniform(0.2, 1.0, (3, 3, 5)) * rng.choice([-1.0, 1.0], (3, 3, 5))
-    return {"angle": angle, "rate": rate, "moment": moment, "power": moment * rate, "idle": 1e-3}
+    more = {"power": moment * rate, "idle": 1e-3}
+    return {"angle": angle, "rate": rate, "speed": rate, "moment": moment} | more
 
 
 class _OfInstants:
@@ -153,10 +160,14 @@ class _OfInstants:
     def _formula(self) -> Formula:
         return formula(getattr(self, self._text), tuple(VARIABLES), SUMMED)
 
+    @property
+    def needs_pace(self) -> bool:
+        return "speed" in self._formula.names
+
     @cached_property
     def needs_forces(self) -> bool:
         """Whether it depends on more than shapes and their rates."""
-        return bool({"moment", "power", "idle"} & self._formula.names)
+        return bool({"speed", "moment", "power", "idle"} & self._formula.names)
 
     @cached_property
     def depends_on_delta(self) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.limits import of_each, range_of, under_one_limit
 from colloc.gaits.problem import Problem
+from colloc.gaits.robot import SPEED_OF_ROBOT
 from colloc.mechanics.balance import largest_moments
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants
@@ -67,7 +68,7 @@ def shares(solution: Solution) -> dict[str, float]:
         now = Instants(*at, z, load=load, joint_map=problem.joint_map)
         if forces and problem.froude:
             moments = joint_torques(solution, _INSTANTS, motion)
-            now = Instants(*at, moments=moments)
+            now = Instants(*at, moments=moments, froude=solution.froude)
         each_used = iter(limits.sizes(limits.at(now)).max(axis=1))
         used |= {x.name: max(float(next(each_used)) for _ in x.names) for x in limits.each}
     return used
@@ -79,8 +80,12 @@ def lines(solution: Solution) -> list[str]:
     for name, share in used.items():
         text = f"{name} {100 * share:.{0 if share >= 0.01 else 2}f} %"
         field = _FIELDS.get(name, "")
-        if field and not isinstance(limit := getattr(solution.problem, field), tuple):
-            text += f" of {limit * units[field].size:g} {units[field].text}"
+        limit, unit = getattr(solution.problem, field, None), units.get(field)
+        robot = solution.problem.robot
+        if robot is not None and name == SPEED_OF_ROBOT:
+            limit, unit = robot.max_speed, _Unit("max_speed", "rad/s")
+        if unit and limit and not isinstance(limit, tuple):
+            text += f" of {limit * unit.size:g} {unit.text}"
         texts.append(text)
     if not used:
         return []

@@ -64,7 +64,7 @@ from colloc.transcription.shape_constraints import ShapeLimits
 from colloc.transcription.velocity_map import BalancedVelocity, velocity_map
 
 ACTUATORS, AT_LEAST, SHAPE_SPEED = "actuators", "at least", "shape speed"
-_Shape = tuple[ca.SX, ca.SX, ca.SX | None]
+_Shape = tuple[ca.SX, ca.SX, ca.SX | None, ca.SX | None]
 """Joint angles, rates and moments of a point."""
 
 
@@ -307,30 +307,30 @@ class FullProgram(Program):
         variables, shape = self._shape(formula.needs_forces)
 
         def value(*local: ca.SX) -> ca.SX:
-            q, r, moments = shape(*local)
+            q, r, moments, froude = shape(*local)
             slow = self.delta * ca.norm_2(r) if self.relative else self.delta
             now = self.dynamics
             how: Any = {"unit": RADIANS, "moments": moments, "joint_map": now.joint_map}
-            return formula.at(Instants(now.body, now.law, q, r, slow, **how))
+            return formula.at(Instants(now.body, now.law, q, r, slow, **how, froude=froude))
 
         return self.repeat(value, variables)
 
     def _shape(self, with_moments: bool) -> tuple[list[np.ndarray], Callable[..., _Shape]]:
-        """Variables of a point, and its joint angles, rates and moments from them."""
+        """Variables of a point; and joint angles, rates, moments and Froude number from them."""
         layout = self.layout
         if layout.z.size:
-            return [layout.angles, layout.rates], lambda q, r: (q, r, None)
+            return [layout.angles, layout.rates], lambda q, r: (q, r, None, None)
         links = [layout.directions, layout.spins]
         if not with_moments:
-            return links, lambda phi, w: (ca.diff(phi), ca.diff(w), None)
+            return links, lambda phi, w: (ca.diff(phi), ca.diff(w), None, None)
         if not layout.momenta.size:
             moments = [*links, layout.moments]
-            return moments, lambda phi, w, moments: (ca.diff(phi), ca.diff(w), moments)
+            return moments, lambda phi, w, moments: (ca.diff(phi), ca.diff(w), moments, None)
         torques = torque_function(self.chain, self.dynamics.law)
 
         def shape(phi: ca.SX, w: ca.SX, rates: ca.SX, momenta: ca.SX, pace: ca.SX) -> _Shape:
-            q, r = ca.diff(phi), ca.diff(w)
-            return q, r, torques(q, r, rates, momenta, self.delta, self._froude(pace))
+            q, r, froude = ca.diff(phi), ca.diff(w), self._froude(pace)
+            return q, r, torques(q, r, rates, momenta, self.delta, froude), froude
 
         return [*links, layout.accelerations, *self._momenta_and_pace()], shape
 

@@ -185,7 +185,7 @@ def balanced_variables(
         x[layout.accelerations] = (matrix @ parameters).T
         torques, froude = torque_function(kind.body, kind.law), kind.froude_at(shapes, begin)
         y = angles, rates, x[layout.accelerations], along.states[: len(layout.momenta)]
-        at = replace(at, moments=torques(*y, slow, froude).full())
+        at = replace(at, moments=torques(*y, slow, froude).full(), froude=froude)
     for quantity, total in zip(layout.integrals, layout.totals, strict=True):
         x[total] = (weight * (speed * quantity.at(at))[0, points]).sum()
     if layout.z.size:

@@ -496,7 +496,7 @@ class GaitWithInertia:
             of, delta = (self.body, self.friction), self.delta
             at = *of, self.path, t, ran.at(t)[7 * motion :][_MOMENTA]
             moments = joint_torques(*at, delta=delta, froude=self.froude)
-            return Instants(*of, *self.path(t), delta, moments=moments)
+            return Instants(*of, *self.path(t), delta, moments=moments, froude=self.froude)
 
         return _sums(seen, self.quantities, ran.phases, aim, ends)
 
@@ -735,7 +735,8 @@ def inertial_replay(
     if limits is not None and limits.names:
         at: Any = {"delta": delta, "froude": regime.froude}
         moments = joint_torques(chain, friction, moving.path, phases, states[_MOMENTA], **at)
-        now = Instants(chain, friction, angles, rates, delta, moments=moments)
+        of = chain, friction, angles, rates, delta
+        now = Instants(*of, moments=moments, froude=regime.froude)
         shares = limits.sizes(limits.at(now)).max(axis=1)
     return Replay(
         values=ran.values,

@@ -248,7 +248,7 @@ def _collocate(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> 
     if isinstance(kind, Inertial):
         how: Any = {"delta": delta, "froude": kind.froude_at(shapes, along.static)}
         at = kind.chain, kind.law, gait, mesh.times, along.states[: len(STATES)]
-        now = replace(now, moments=joint_torques(*at, **how))
+        now = replace(now, moments=joint_torques(*at, **how), froude=how["froude"])
     work = (weights * along.now.power[mesh.points]).sum(axis=1)
     sums = {
         each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1)

@@ -83,7 +83,6 @@ def test_inertia_counts_from_a_thousandth_of_friction_on():
         ({"mass": 0.0}, "mass must be a number"),
         ({"period": (3.0, 2.0)}, "the shortest and the longest"),
         ({"idle_power": -1.0}, "idle_power must be a number from 0 on"),
-        ({"max_speed": 5.0, "period": (1.0, 2.0)}, "cannot be limited by max_speed"),
     ],
 )
 def test_what_no_robot_is_gets_a_sentence(wrong, words):
@@ -132,3 +131,19 @@ def test_a_figure_of_a_robot_has_its_units(slow_robot):
         for place, label in places:
             number = float(label.get_text().replace("−", "-"))
             assert number == pytest.approx(unit * place, abs=1e-6 * unit)
+
+
+def test_a_period_that_is_sought_keeps_the_speed_of_the_motors():
+    robot = Robot(length=0.62, mass=0.9, period=(1, 20), max_speed=2.0, idle_power=2)
+    problem = Problem("sought", gait=Harmonic(1, "antipodal"), robot=robot, delta=1e-2)
+    solution = colloc.solve(problem, starts=2)
+    assert solution.success
+    period = in_si(solution)["period_s"]
+    assert 1 < period < 20
+    t = np.linspace(0, 1, 4001)
+    fastest = np.abs(solution.gait.rates(t)).max() / period
+    assert fastest == pytest.approx(2.0, rel=1e-4)  # idle power hurries
+    # at that period, stated, the gait is as good
+    stated = problem.with_(robot=replace(robot, period=period))
+    again = colloc.solve(stated.with_(guess=replace(solution.gait, log_period=None)), starts=1)
+    assert again.value == pytest.approx(solution.value, rel=1e-3)
