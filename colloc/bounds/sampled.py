@@ -96,15 +96,11 @@ class Bound:
     joint_limit: float
     intervals: int
     harmonics: tuple[int, ...]
-    coefficients: tuple[float, ...]  # free ones of the potential, in `potential_space`
+    coefficients: tuple[float, ...]  # free ones of the potential
     samples: int
     seconds: float  # processor time
     graded: tuple[float, ...] = ()  # inner knots, if they are not evenly spaced
     together: int | None = None
-
-    def potential_space(self, body: Chain) -> PotentialSpace:
-        spline = TensorSpline(body.n_joint, self.joint_limit, self.intervals, self.graded)
-        return PotentialSpace(spline, self.harmonics, body.symmetric, self.together)
 
     def report(self, efficiency: float) -> str:
         """Efficiency, bound, gap, and what is proved, in one line."""

@@ -117,9 +117,6 @@ class ControlProblem:
         """Value of the objective in the problem's units."""
         return value * _size(self.aims.objective, self.unit)
 
-    def in_units(self, value: float) -> float:
-        return value / _size(self.aims.objective, self.unit)
-
 
 def control_problem(problem: Problem) -> ControlProblem:
     gait, law, regime = problem.gait, problem.law, problem.regime

@@ -39,8 +39,6 @@ _NUMBERS = {
 
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """A number of a problem."""
-
     name: str
     value: float  # the first, if several change together
     changed: Callable[[float], Problem]

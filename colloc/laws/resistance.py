@@ -89,7 +89,7 @@ class PowerLaw(Coefficients):
     kernel_numbers = ()
 
     def __post_init__(self) -> None:
-        check_positive(self, "mu_t", "mu_f", "mu_b", of="friction.")
+        check_positive(self, *self.by_name, of="friction.")
         if not (is_number(self.power) and 0 <= self.power <= 2):
             raise ProblemError(
                 f"friction.power must lie in [0, 2], not {self.power!r}; friction that falls with "
@@ -114,9 +114,6 @@ class PowerLaw(Coefficients):
     def describe(self) -> str:
         each = f"{self.mu_t:g} sideways, {self.mu_f:g} forwards, {self.mu_b:g} backwards"
         return f"{each}, times the speed to the power {self.power:g}"
-
-    def in_units_of(self, unit: float) -> PowerLaw:
-        return PowerLaw(self.power, **{name: getattr(self, name) / unit for name in self.by_name})
 
     def in_speeds_of(self, unit: float) -> PowerLaw:
         return self.in_units_of(unit**-self.power)
@@ -178,7 +175,7 @@ class Viscous:
     kernel_numbers = ()
 
     def __post_init__(self) -> None:
-        check_positive(self, "normal", "tangential", of="friction.")
+        check_positive(self, *self.by_name, of="friction.")
 
     @property
     def smallest(self) -> float:

@@ -22,9 +22,9 @@ Two panels meet at y = 0, or at the end nearest to it: a law may have a kink the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import singledispatch
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -74,6 +74,10 @@ class Coefficients:
     def reversible(self) -> bool:
         return self.mu_b == self.mu_f
 
+    def in_units_of(self, unit: float) -> Self:
+        scaled = {name: getattr(self, name) / unit for name in self.by_name}
+        return replace(self, **scaled)  # type: ignore[type-var]
+
     def tangential(self, vs: Array) -> Array:
         """Coefficient mu_s of sliding along the body with velocity `vs`."""
         if self.reversible:
@@ -107,8 +111,8 @@ class Friction(Coefficients):
     regularised = True
 
     def __post_init__(self) -> None:
-        check_positive(self, "mu_t", "mu_f", "mu_b", of="friction.")
-        if max(self.mu_t, self.mu_f, self.mu_b) > _LARGEST:
+        check_positive(self, *self.by_name, of="friction.")
+        if self.largest > _LARGEST:
             raise ProblemError(
                 f"friction holds more than {_LARGEST:g} times what presses: no floor does."
             )
@@ -129,9 +133,6 @@ class Friction(Coefficients):
             f"μt = {self.mu_t:g} sideways, μf = {self.mu_f:g} forwards, μb = {self.mu_b:g} "
             f"backwards"
         )
-
-    def in_units_of(self, unit: float) -> Friction:
-        return type(self)(mu_t=self.mu_t / unit, mu_f=self.mu_f / unit, mu_b=self.mu_b / unit)
 
     def in_speeds_of(self, unit: float) -> Friction:
         return self
@@ -213,7 +214,6 @@ class LineIntegrals:
         return self._matrix(self.law.density_jacobian, vs, vn, w, length, delta)
 
     def secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        """`colloc.mechanics.law.Law.density_secant`, integrated, 3 x 3."""
         return self._matrix(self.law.density_secant, vs, vn, w, length, delta)
 
     def _matrix(
@@ -228,8 +228,6 @@ class LineIntegrals:
         return tuple(tuple(entries[k : k + 3]) for k in (0, 3, 6))
 
     def potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
-        """`colloc.mechanics.law.Law.density_potential`, integrated."""
-
         def at(sigma: Array, y: Array) -> tuple[Array, ...]:
             return (self.law.density_potential(vs, y, delta),)
 

@@ -50,13 +50,6 @@ def momenta(body: Chain, posture: Posture, link: LinkVelocity) -> Array:
     return xp.stack([vx, vy, xp.sum_rows(mass * swing + body.inertia_column() * link.w)])
 
 
-def moment_of_inertia(body: Chain, posture: Posture) -> Array:
-    """Moment of inertia about the centre of mass, ``(1, n_time)``."""
-    xp, (x, y) = namespace(posture.x), body.centre_of_mass(posture)
-    square = (posture.x - x) ** 2 + (posture.y - y) ** 2
-    return xp.sum_rows(body.mass_column() * square + body.inertia_column())
-
-
 def kinetic_energy(body: Chain, angles: Array, rates: Array, z: Array) -> Array:
     """Kinetic energy of a body of mass 1, ``(1, n_time)``."""
     link = body.velocity(body.posture(angles), rates, z)
@@ -78,8 +71,11 @@ def inertial_moments(
 def tail_velocity(body: Chain, angles: Array, rates: Array, states: Array) -> Array:
     """Tail velocity ``(3, n_time)`` of a chain with momenta `states`, ``(3, n_time)``."""
     posture = body.posture(angles)
+    x, y = body.centre_of_mass(posture)
     left = states - momenta(body, posture, body.velocity(posture, rates, 0 * states))
-    omega, (x, y) = left[2:3, :] / moment_of_inertia(body, posture), body.centre_of_mass(posture)
+    square = (posture.x - x) ** 2 + (posture.y - y) ** 2
+    inertia = namespace(square).sum_rows(body.mass_column() * square + body.inertia_column())
+    omega = left[2:3, :] / inertia
     return namespace(angles, states).stack(
         [left[0:1, :] + omega * y, left[1:2, :] - omega * x, omega]
     )

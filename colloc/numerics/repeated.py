@@ -196,11 +196,6 @@ class Program:
         )  # fmt: skip
 
 
-def as_sparse(matrix: ca.DM) -> sparse.csr_matrix:
-    parts = matrix.nonzeros(), matrix.row(), matrix.colind()
-    return sparse.csc_matrix(parts, shape=matrix.shape).tocsr()
-
-
 def _matrix(shape: tuple[int, int], places: list, values: ca.MX) -> ca.MX:
     """Sparse matrix with entries at places (row, column, factor), each ``(n_entry,
     n_instance)``."""

@@ -15,6 +15,7 @@ from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import Pairs
 from colloc.mechanics.densities import PathLimits
 from colloc.numerics.peaks import SAMPLES, curvature_of_moving, peaks
+from colloc.numerics.sqp import keep_last
 from colloc.reduced.motion import ReducedMotion
 
 _EMPTY = np.empty(0)
@@ -237,7 +238,7 @@ class ReducedProgram:
         limits = control.actuators
         self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
-        self._gradients: tuple[bytes, float, dict[str, np.ndarray]] | None = None
+        self._slopes = keep_last(lambda v: self.motion.gradients(v, delta))
 
     def place_rows(self, v: np.ndarray) -> float:
         """Move all rows to the worst instants of v; return how far it exceeds any bound."""
@@ -305,12 +306,6 @@ class ReducedProgram:
 
     def _slope(self, aim: Objective, v: np.ndarray) -> np.ndarray:
         return aim.gradient(self.motion.values(v, self.delta), self._slopes(v)) + np.zeros_like(v)
-
-    def _slopes(self, v: np.ndarray) -> dict[str, np.ndarray]:
-        key = v.tobytes()
-        if self._gradients is None or self._gradients[:2] != (key, self.delta):
-            self._gradients = (key, self.delta, self.motion.gradients(v, self.delta))
-        return self._gradients[2]
 
     def rows(self, v: np.ndarray) -> np.ndarray:
         values = self.motion.values(v, self.delta) if self._own_lower.size else {}

@@ -26,7 +26,7 @@ def is_trivial(answer: Answer) -> bool:
     """True for a gait that goes nowhere and does not turn, as a retraced one."""
     problem = answer.problem
     if problem.regime.slides:
-        return control_problem(problem).in_units(answer.value) < TOLERANCES.zero_value
+        return answer.value / control_problem(problem).unscale(1.0) < TOLERANCES.zero_value
     return goes_nowhere(answer) and not abs(answer.motion.rotation) > TOLERANCES.angle
 
 

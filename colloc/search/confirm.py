@@ -188,7 +188,6 @@ def _answer(
 
 
 def answer_of(program: FullProgram, result: NlpResult, delta: float) -> Answer:
-    """A point of a full program, as an answer to the stated problem."""
     control, n = program.control, program.layout.n
     answer = _answer(
         *(control, program.mesh, program.member(result.x), result.x[:n], result, result),

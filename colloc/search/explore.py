@@ -61,8 +61,6 @@ class Candidate:
 
 
 class Exploration(NamedTuple):
-    """Distinct optima of many starts."""
-
     optima: list[Iterate]  # at the final delta, best first, before their meshes are refined
     starts: int
     others: Sequence[Alternative] = ()  # all distinct gaits met, best first
@@ -132,11 +130,12 @@ def explore(problem: Problem, starts: int | None = None) -> Exploration:
         [(other.value, fourier_series(problem, other.gait)) for other in each.others]
         for each in (any_size, large)
     )
-    others = [*any_size.others]
-    for other, path in zip(large.others, new, strict=True):
-        if not any(are_one(one, path, problem.body, problem.law) for one in old):
-            others.append(other)
-    others.sort(key=lambda other: -other.value)
+    more = (
+        other
+        for other, path in zip(large.others, new, strict=True)
+        if not any(are_one(one, path, problem.body, problem.law) for one in old)
+    )
+    others = sorted([*any_size.others, *more], key=lambda other: -other.value)
     return Exploration(optima, any_size.starts + large.starts, others, any_size.left)
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from scipy import sparse
 
 from colloc.numerics.repeated import (
-    as_sparse,
     least_squares_multipliers,
     quasi_definite_factors,
 )
@@ -92,7 +91,9 @@ class Solver:
         x, delta = at[:-1], at[-1] / self.program.delta_unit
         f, gradient = self._nlp.functions["grad_f"](x, delta)
         g, jacobian = self._nlp.functions["jac_g"](x, delta)
-        return float(f), gradient.full().ravel(), g.full().ravel(), as_sparse(jacobian)
+        parts = jacobian.nonzeros(), jacobian.row(), jacobian.colind()
+        slopes = sparse.csc_matrix(parts, shape=jacobian.shape).tocsr()
+        return float(f), gradient.full().ravel(), g.full().ravel(), slopes
 
     def solve_within(
         self,
@@ -261,7 +262,6 @@ _ADVICE = {
 
 
 def row_meaning(program: FullProgram, row: int) -> tuple[str, float]:
-    """Meaning of a constraint row, and its phase."""
     name = _group(program, row)
     rows, mesh = program.groups[name], program.mesh
     index, count = row - rows.start, rows.stop - rows.start

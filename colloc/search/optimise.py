@@ -143,7 +143,6 @@ def with_kink(iterate: Iterate) -> Iterate:
 
 
 def delta_levels(problem: Problem, first: float) -> list[float]:
-    """Deltas from a first one down to the problem's."""
     levels = [first]
     while levels[-1] > problem.delta:
         levels.append(max(OPTIONS.delta_ratio * levels[-1], problem.delta))

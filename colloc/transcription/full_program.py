@@ -466,7 +466,6 @@ class FullProgram(Program):
         return program
 
     def feasible(self, parameters: np.ndarray, delta: float) -> np.ndarray:
-        """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
         motion = balanced_variables(self.control, self.layout, self.mesh, parameters, delta)
         shape = parameters[: len(self.layout.parameters)]
         return np.concatenate([motion, self.limits.bends(shape)])

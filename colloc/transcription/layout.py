@@ -12,7 +12,6 @@ from colloc.dynamics.chain import torque_function
 from colloc.dynamics.collocated import CollocatedPose, point_weights, stage_weights, sums
 from colloc.dynamics.control_problem import ControlProblem
 from colloc.dynamics.dynamics import OMEGA, PeriodTotals, Shapes
-from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.period import chord_per_way
 from colloc.mechanics.bodies import FULL
 from colloc.mechanics.chain import Chain
@@ -138,7 +137,6 @@ def balanced_variables(
     mesh: Mesh,
     parameters: np.ndarray,
     delta: float,
-    gait: AnyGait = None,
 ) -> np.ndarray:
     """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
     gaits, n_joint = control.admissible.gait, control.admissible.n_joint
@@ -146,10 +144,7 @@ def balanced_variables(
     x = np.zeros(layout.n)
     x[layout.decisions] = parameters
     parameters, begin = np.split(parameters, [len(layout.parameters)])
-    if gait is None:
-        gait = gaits.trajectory(parameters, n_joint)
-    else:
-        begin = kind.static_of(gait)
+    gait = gaits.trajectory(parameters, n_joint)
     angles, rates = gait.angles(mesh.times), gait.rates(mesh.times) / RADIANS
     relative, speed = gaits.relative_delta, np.ones(mesh.n_point)
     if relative:

@@ -232,9 +232,14 @@ def fine_motion(
 
 def _cumulative(parts: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Orientation, lab displacement, and work and quantities at the edges."""
-    theta, *totals = (np.append(0.0, np.cumsum(part)) for part in (parts[0], *parts[2:]))
-    moved = np.exp(1j * theta[:-1]) * parts[1]
-    return theta, np.append(0.0, np.cumsum(moved)), np.stack(totals)
+    totals = [np.append(0.0, np.cumsum(part)) for part in parts[2:]]
+    return *poses(*parts[:2]), np.stack(totals)
+
+
+def poses(turn: np.ndarray, move: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heading and place (complex) before every panel and after the last ``(n + 1,)``."""
+    heading = np.append(0.0, np.cumsum(turn))
+    return heading, np.append(0.0, np.cumsum(np.exp(1j * heading[:-1]) * move))
 
 
 @dataclass(frozen=True)
@@ -272,19 +277,12 @@ class Replay(Period):
 
     @property
     def value(self) -> float:
-        """The objective."""
         return self.objective(self.values)
 
     @property
     def ambiguity(self) -> float:
         """Largest relative change of the objective by other balanced motions."""
         return self.ambiguity_of(self.objective)
-
-    @property
-    def turning(self) -> float:
-        """Rotation times lever over distance: relative change of the distance by another followed
-        point of the body."""
-        return abs(self.rotation) * self.lever / max(self.distance, 1e-300)
 
 
 def to_tolerance(

@@ -38,7 +38,7 @@ from colloc.mechanics.densities import (
 from colloc.mechanics.law import Law
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
-from colloc.verification.adaptive_motion import Path, Replay, lever
+from colloc.verification.adaptive_motion import Path, Replay, lever, poses
 from colloc.verification.differential_motion import inertial_replay, slope_replay
 
 MOST_INSTANTS = 10_000_000
@@ -102,12 +102,6 @@ def first_panels(left: np.ndarray, width: np.ndarray, values: tuple[np.ndarray, 
     paired = [np.concatenate([a[::2, ::2], a[1::2, 2::2]], axis=1) for a in values]
     pairs = Panels(left[::2], 2 * width[::2], *[*paired, np.empty(0)])
     return Panels(left, width, *[*values, np.repeat(changes(pairs)[0], 2, axis=0)])
-
-
-def poses(turn: np.ndarray, move: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heading and place (complex) before every panel and after the last ``(n + 1,)``."""
-    heading = np.concatenate([[0.0], np.cumsum(turn)])
-    return heading, np.concatenate([[0.0], np.cumsum(np.exp(1j * heading[:-1]) * move)])
 
 
 def increments(panels: Panels, rule: np.ndarray = WHOLE) -> tuple[np.ndarray, ...]:

@@ -21,6 +21,7 @@ import numpy as np
 
 from colloc.bounds.sampled import efficiency_bound
 from research.guarantee.guaranteed import certify
+from research.guarantee.potential_range import potential_space
 from scripts.check_potential import add_domain, domain_of, potentials
 
 
@@ -51,7 +52,7 @@ def main() -> None:
             f"sampled {bound.sampled:.5f} on {bound.samples} motions in {bound.seconds:.0f} s",
             flush=True,
         )
-        space, free = bound.potential_space(domain.body), np.array(bound.coefficients)
+        space, free = potential_space(bound, domain.body), np.array(bound.coefficients)
     begin = time.perf_counter()
     part = (arguments.part[0], arguments.part[1])
     certificate = certify(

@@ -8,13 +8,21 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.bounds.potential import DEGREE, PotentialSpace
+from colloc.bounds.potential import DEGREE, PotentialSpace, TensorSpline
+from colloc.bounds.sampled import Bound
+from colloc.mechanics.chain import Chain
 from research.guarantee.enclosure import WIDER, Cells, ReferencePoint, spread
 from research.guarantee.kernel import call
 from research.guarantee.loaded_balance import Loaded
 
 _HEADINGS = 192
 _ORDERS = ((1, 0), (0, 1), (2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
+
+
+def potential_space(bound: Bound, body: Chain) -> PotentialSpace:
+    """The space in which a bound's coefficients are those of its potential."""
+    spline = TensorSpline(body.n_joint, bound.joint_limit, bound.intervals, bound.graded)
+    return PotentialSpace(spline, bound.harmonics, body.symmetric, bound.together)
 
 
 def gain_bound(amplitudes: dict[int, np.ndarray]) -> np.ndarray:

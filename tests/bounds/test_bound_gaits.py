@@ -10,6 +10,7 @@ from colloc import Chain, Friction
 from colloc.bounds.motions import CoulombMotion, admissible
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
+from research.guarantee.potential_range import potential_space
 from research.small_gaits import balanced_motion, best_small_gait, small_gait
 from tests.shared.laws import coulomb
 
@@ -96,7 +97,7 @@ def test_a_bound_is_pinned_from_both_sides(isotropic):
 
     def value(q, r):
         samples = Samples(
-            isotropic.potential_space(Chain()), balanced_motion(Chain(), Friction(), q, r, 1e-6)
+            potential_space(isotropic, Chain()), balanced_motion(Chain(), Friction(), q, r, 1e-6)
         )
         return samples.ratio(np.array(isotropic.coefficients))[0]
 

@@ -18,6 +18,7 @@ from colloc.bounds.motions import Domain
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.mechanics.inertia import kinetic_energy
 from research.guarantee.guaranteed import certify
+from research.guarantee.potential_range import potential_space
 from tests.shared.laws import coulomb
 
 LENGTHS, WEIGHTS = (0.2, 0.5, 0.3), (0.5, 0.2, 0.3)
@@ -71,7 +72,7 @@ def test_a_bound_knows_the_weights_or_refuses():
     assert abs(plain.sampled - other.sampled) > 1e-3
     numbers = np.array(other.coefficients)
     with pytest.raises(ProblemError, match="weights"):
-        certify(Domain(heavy, Friction(), np.pi), other.potential_space(heavy), numbers, 0.6)
+        certify(Domain(heavy, Friction(), np.pi), potential_space(other, heavy), numbers, 0.6)
 
 
 def test_masses_that_are_the_weights_are_no_masses():

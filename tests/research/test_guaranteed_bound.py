@@ -30,7 +30,7 @@ from research.guarantee.enclosure import (
 )
 from research.guarantee.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
 from research.guarantee.loaded_balance import loaded_balance
-from research.guarantee.potential_range import PotentialRange, turned
+from research.guarantee.potential_range import PotentialRange, potential_space, turned
 from research.small_gaits import balanced_motion
 from tests.shared.without_kernel import numpy_instead
 
@@ -49,7 +49,7 @@ def bound() -> Bound:
 
 @pytest.fixture(scope="module")
 def potential(bound) -> PotentialRange:
-    return PotentialRange(bound.potential_space(BODY), np.array(bound.coefficients))
+    return PotentialRange(potential_space(bound, BODY), np.array(bound.coefficients))
 
 
 def all_cells(low, sizes):
@@ -350,7 +350,7 @@ def test_a_cell_whose_bound_is_not_a_number_stays_open(bound, potential, monkeyp
 def stated(bound, friction=UNIT):
     """Domain and potential of a bound, as `certify` takes them."""
     domain = Domain(BODY, friction, bound.joint_limit)
-    return domain, bound.potential_space(BODY), np.array(bound.coefficients)
+    return domain, potential_space(bound, BODY), np.array(bound.coefficients)
 
 
 @needs_kernel

@@ -119,7 +119,8 @@ def test_another_followed_point_changes_the_distance_by_at_most_rotation_times_l
         swung = (np.exp(1j * result.rotation) - 1) * arms
         moved = np.abs(result.distance * headings[:, None] + swung)
         change = np.abs(moved / result.distance - 1).max()
-        assert 0.3 * result.turning < change <= result.turning
+        turning = abs(result.rotation) * result.lever / result.distance
+        assert 0.3 * turning < change <= turning
 
 
 def test_the_error_of_the_efficiency_is_made_of_those_of_distance_and_work():
