@@ -390,7 +390,8 @@ evaluate(PROBLEM, 0.01 * GAIT.angles(np.arange(60) / 60)) -> hardly moves
 evaluate(PROBLEM, "nowhere.csv") -> cannot read nowhere.csv
 evaluate(PROBLEM, {"a": 1}) -> gait must be a Fourier, numbers, text, a path or a function
 evaluate(Problem("up", gait=Harmonic(1), grade=0.1), GAIT) -> colloc\.slope_motion
-evaluate(Problem("x", gait=Harmonic(1), froude=Free(0.1, 1.0), objective="efficiency"), GAIT) -> does not say its pace
+evaluate(Problem("x", gait=Harmonic(1), froude=Free(0.1, 1.0), objective="efficiency"), GAIT) -> evaluated at one pace
+evaluate(Problem("x", gait=Harmonic(1), froude=0.1, objective="distance / period"), GAIT) -> evaluated at one pace
 steer(PROBLEM, []) -> half a turn|a sequence of numbers
 steer(PROBLEM, [4.0]) -> half a turn|a sequence of numbers
 steer(PROBLEM, [float("nan")]) -> half a turn|a sequence of numbers

@@ -103,8 +103,11 @@ def evaluate(
                 f"{gait}: all joints move about {fitted.centre}°, where links cross: if servos "
                 f"stand so when the body is straight, subtract it from every column of angles."
             )
-    # refuses one that does not say a pace which the problem leaves open
-    problem.regime.at(series)
+    if problem.regime.free is not None:
+        raise ProblemError(
+            "a gait is evaluated at one pace, by an objective that does not speak of the period: "
+            "state froude=0.05 (a robot: one period), and such an objective."
+        )
     gait_class: AnyClass = Harmonic(series.n_harmonic)
     driven: AnyGait = series
     if isinstance(problem.gait, Coupled):
