@@ -20,6 +20,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, read_problem_file
 from colloc.gaits.regime import Free
 from colloc.gaits.robot import Robot
+from colloc.gaits.robot_model import Model, read_model
 from colloc.mechanics.chain import Chain
 from colloc.results import limit_use
 from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 _ROLLING = 0.02  # coefficient of friction of a wheel along
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
+_LARGEST, _ALIKE = 3.14, 1e-6  # angle of a joint [rad], and difference of parts that are the same
 _MANY_INTERVALS, _SECONDS_PER_INTERVAL = 1000, 0.02
 EXIT = {
     SOLVED: OK,
@@ -42,18 +44,25 @@ EXIT = {
     CERTIFICATE_FAILED: FAILED,
     INTERRUPTED: CODE_INTERRUPTED,
 }
+_WHEELS = "tuple(Wheel(link, rolling={rolling:g}, sideways={mu:g}) for link in range({links}))"
 _FLOOR = {
     "": "    body=Chain({lengths}),",
     "feet": """\
     # and what they stand on: feet on each link, evenly spread; or one by one,
     # feet=(Foot(0), Wheel(1), ...)
     body=Chain({lengths}, feet={feet}),""",
-    "wheels": """\
+    "wheels": f"""\
     # and what they stand on: a wheel in the middle of each link, with its own friction
     # in units of the weight
     body=Chain(
-        {lengths},
-        feet=tuple(Wheel(link, rolling={rolling:g}, sideways={mu:g}) for link in range({links})),
+        {{lengths}},
+        feet={_WHEELS},
+    ),""",
+    "model": """\
+    # as {source} has it, with the same angles, which count from the tail and counter-clockwise,
+    # but for signs: {joints}
+    body=Chain(
+        {rows},
     ),""",
 }
 _SIZE = """\
@@ -86,7 +95,7 @@ PROBLEM = Problem(
     gait=Harmonic(harmonics=2, symmetry="{symmetry}"),
     # the largest angle of a joint [rad], at most pi. In degrees: `from math import radians`
     # above, and radians(100) here
-    joint_limit={joint_limit:.6g},
+    joint_limit={joint_limit},
 {robot}    # No guess is needed: travelling waves, known gaits and random ones are tried.
     # guess=Fourier(mean, cos, sin) adds yours.
 )
@@ -118,6 +127,7 @@ The file runs as it is; one that is there already is left alone. A robot of --le
 
   colloc init mine.py --links 4 --feet 1
   colloc init mine.py --links 22 30 30 22 --wheels
+  colloc init mine.py --from robot.urdf --period 2.5
   colloc init mine.py --links 22 30 30 22 --wheels --mu 0.3 --joint-limit 85deg \\
       --length 0.62 --mass 0.9 --period 2.5 --max-speed 5 --max-torque 1.2 --idle-power 2
   colloc solve mine.py""",
@@ -130,6 +140,7 @@ The file runs as it is; one that is there already is left alone. A robot of --le
         nargs="+",
     ),
     cli.option(float, "--lengths", "L", "of the links, as with --links", nargs="+"),
+    cli.option(Path, "--from", "FILE", "URDF or MJCF of the robot, a planar chain"),
     cli.option(int, "--feet", "N", "feet on each link (default: none, links lie flat)"),
     cli.flag("--wheels", "a wheel in the middle of each link"),
     cli.option(float, "--mu", "MU", "coefficient of friction (default: 1)", 1.0, least=0),
@@ -138,7 +149,6 @@ The file runs as it is; one that is there already is left alone. A robot of --le
         "--joint-limit",
         "ANGLE",
         "largest angle of a joint [rad] (default: 3.14)",
-        3.14,
         least=0,
     ),
     cli.option(
@@ -168,11 +178,20 @@ The file runs as it is; one that is there already is left alone. A robot of --le
 )
 def init(options: argparse.Namespace) -> int:
     path: Path = options.problem
-    for one, other in (("links", "lengths"), ("feet", "wheels")):
+    source: Path | None = getattr(options, "from")
+    for one, other in (
+        ("links", "lengths"),
+        ("feet", "wheels"),
+        ("from", "links"),
+        ("from", "lengths"),
+    ):
         if getattr(options, one) is not None and getattr(options, other):
             raise ProblemError(f"--{one} and --{other} exclude each other; see colloc init --help.")
+    model = None if source is None else read_model(source)
     lengths = options.lengths or options.links or [float(_FEWEST)]
-    if options.lengths is None and len(lengths) == 1:
+    if model:
+        lengths = model.lengths
+    elif options.lengths is None and len(lengths) == 1:
         if not lengths[0].is_integer():
             raise ProblemError(f"--links must be a whole number of links, not {lengths[0]:g}.")
         lengths = [1.0] * max(0, min(int(lengths[0]), _MOST + 1))
@@ -187,32 +206,36 @@ def init(options: argparse.Namespace) -> int:
         )
     if path.suffix != ".py":
         raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
-    feet, robot = options.feet or 0, _stated_robot(options)
+    feet, robot, limit = options.feet or 0, _stated_robot(options, model), options.joint_limit
     # raises for a name that files cannot have
     Problem(path.stem, body=Chain(tuple(length / whole for length in lengths), feet=feet))
-    floor = "wheels" if options.wheels else "feet" if feet else ""
-    floor = _FLOOR[floor].format(
-        lengths=f"({', '.join(f'{length:.12g} / {whole:.12g}' for length in lengths)})",
-        feet=feet,
-        links=links,
-        mu=options.mu,
-        rolling=_ROLLING,
-    )
+    floor = _floor(options, model, lengths)
+    symmetric, limit = lengths == lengths[::-1], f"{options.joint_limit or _LARGEST:.6g}"
+    if model:
+        if options.joint_limit is None:
+            each = [f"{b:.6g}" if a == -b else f"({a:.6g}, {b:.6g})" for a, b in model.limits]
+            limit = each[0] if len({*each}) == 1 else f"({', '.join(each)})"
+        # a body with more to it may differ from both ends
+        symmetric &= not model.feet and "weights" not in floor and "(" not in limit
     arguments = ", ".join(f"{name}={value!r}" for name, value in robot.items())
-    size = _SIZE * ("idle_power" not in robot)
-    smallest = min(options.mu, _ROLLING) if options.wheels else options.mu
+    size, more = _SIZE * ("idle_power" not in robot), ""
+    if model and not robot:
+        known = ", ".join(f"{name}={value!r}" for name, value in _known(model, {}).items())
+        more = f"    # in SI units, with `Robot` imported: robot=Robot(period=..., {known}),\n"
+    smallest = min(options.mu, _ROLLING) if "Wheel(" in floor else options.mu
     has_inertia = bool(robot) and Robot(**robot).derived(0.0, smallest)["froude"] != 0
+    parts = ("Foot", "Friction", "Harmonic", "Pad", "Problem", "Robot", "Wheel")
+    needs = "Friction Harmonic Problem" + " Robot" * bool(robot)
     content = _TEMPLATE.format(
         links=links,
         file=path.name,
         name=path.stem,
-        names=f"Chain, Friction, Harmonic, Problem{', Robot' * bool(robot)}"
-        f"{', Wheel' * options.wheels}",
+        names=", ".join(["Chain", *(x for x in parts if x in needs or f"{x}(" in floor)]),
         floor=floor,
         mu=options.mu,
-        joint_limit=options.joint_limit,
-        robot=_ROBOT.format(robot=arguments) * bool(robot) + size,
-        symmetry="bilateral" if lengths == lengths[::-1] and not has_inertia else "none",
+        joint_limit=limit,
+        robot=_ROBOT.format(robot=arguments) * bool(robot) + size + more,
+        symmetry="bilateral" if symmetric and not has_inertia else "none",
     )
     try:
         with path.open("x", encoding="utf-8") as file:
@@ -225,15 +248,57 @@ def init(options: argparse.Namespace) -> int:
         path.unlink()
         raise
     line = f"wrote {path}: a problem of {links} links. Change it, then: colloc solve {path}"
-    cli.tell(options, {"status": "written", "file": str(path), "links": links}, [line])
+    facts: dict[str, Any] = {"status": "written", "file": str(path), "links": links}
+    lines = [line]
+    if model:
+        facts |= {"joints": model.joints, "notes": model.notes}
+        lines += [f"  {x}" for x in (f"angles in {source}: {model.joints}", *model.notes)]
+        if "feet=" not in floor:
+            lines.append("  no wheels or feet are known: links lie on the floor (--feet, --wheels)")
+    cli.tell(options, facts, lines)
     return OK
 
 
-def _stated_robot(options: argparse.Namespace) -> dict[str, Any]:
+def _floor(options: argparse.Namespace, model: Model | None, lengths: list[float]) -> str:
+    """The line of the body in a problem file."""
+
+    def shares(values: list[float]) -> str:
+        return f"({', '.join(f'{x:.12g} / {math.fsum(values):.12g}' for x in values)})"
+
+    values = {"mu": options.mu, "rolling": _ROLLING, "links": len(lengths)}
+    if model is None:
+        kind = "wheels" if options.wheels else "feet" if options.feet else ""
+        return _FLOOR[kind].format(lengths=shares(lengths), feet=options.feet, **values)
+    rows, whole, mass = [shares(lengths)], math.fsum(lengths), math.fsum(model.masses)
+    each = zip(lengths, model.masses, strict=False)
+    if any(abs(x / whole - m / mass) > _ALIKE for x, m in each):
+        rows.append(f"weights={shares(model.masses)}")
+    if options.wheels:
+        rows.append(f"feet={_WHEELS.format(**values)}")
+    elif options.feet or model.feet:
+        one_by_one = ", ".join(x.format(**values) for x in model.feet)
+        rows.append(f"feet={options.feet or f'({one_by_one})'}")
+    return _FLOOR["model"].format(
+        source=getattr(options, "from").name, joints=model.joints, rows=",\n        ".join(rows)
+    )
+
+
+def _known(model: Model, stated: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of a `Robot` that its file states."""
+    speed = model.max_speed if len(stated.get("period", "1")) == 1 else []
+    whole = {"length": [math.fsum(model.lengths)], "mass": [math.fsum(model.masses)]}
+    each = whole | {"max_speed": speed, "max_torque": model.max_torque}
+    rows = {name: [float(f"{x:.9g}") for x in values] for name, values in each.items()}
+    return {x: y[0] if len({*y}) == 1 else y for x, y in rows.items() if y and min(y) > 0}
+
+
+def _stated_robot(options: argparse.Namespace, model: Model | None) -> dict[str, Any]:
     """Arguments of a `Robot`; none if no option speaks of it."""
     robot = {name: x for name in _STATED if (x := getattr(options, name)) is not None}
     if not robot:
         return {}
+    if model:
+        robot = _known(model, robot) | robot
     if missing := [f"--{name}" for name in _STATED[:3] if name not in robot]:
         raise ProblemError(
             f"a robot in SI units needs --length, --mass and --period; {' and '.join(missing)} "

@@ -1,0 +1,249 @@
+"""A robot's own file, URDF or MJCF, as a problem: links, masses, limits and signs as computed by hand,
+what colloc exports read back, and what is no planar chain refused by name."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Wheel
+from colloc.commands.ending import BAD_PROBLEM, OK
+from colloc.commands.solve import init as main
+from colloc.gaits.problem_file import read_problem_file
+
+# of a worm of three segments whose second axis points down
+LINKS = {"tail": (0.12, 0.05), "mid": (0.20, 0.06), "head": (0.28, 0.05)}
+LIMIT = '<limit lower="-0.5" upper="1.2" effort="1.5" velocity="5"/>'
+
+
+def link(name, mass=0.1, at="0 0 0", more=""):
+    inertial = f'<inertial><mass value="{mass}"/><origin xyz="{at}"/></inertial>'
+    return f'<link name="{name}">{inertial}{more}</link>'
+
+
+def joint(name, parent, child, at, axis="0 0 1", kind="revolute", limit=LIMIT):
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    place = f'<origin xyz="{at}"/><axis xyz="{axis}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{place}{limit}</joint>'
+
+
+WORM = (
+    *(link(name, mass, f"{middle} 0 0") for name, (mass, middle) in LINKS.items()),
+    joint("j1", "tail", "mid", "0.10 0 0"),
+    joint("j2", "mid", "head", "0.12 0 0", axis="0 0 -1"),
+)
+
+
+def read(tmp_path, content, *words, kind="urdf"):
+    """The exit code of `colloc init --from` of such a file, and the problem, if it is one."""
+    source, path = tmp_path / f"robot.{kind}", tmp_path / "mine.py"
+    if kind == "urdf" and isinstance(content, (tuple, list)):
+        content = f"<robot name='r'>{''.join(content)}</robot>"
+    if isinstance(content, str):
+        source.write_text(content, encoding="utf-8")
+    path.unlink(missing_ok=True)
+    code = main([str(path), "--from", str(source), *words])
+    return read_problem_file(path).problem if code == OK else code
+
+
+def test_a_urdf_is_the_chain_that_one_computes_by_hand(tmp_path, capsys):
+    problem = read(tmp_path, WORM, "--period", "2")
+    # from joint to joint, and at the ends twice as far as the mass is from the joint
+    lengths, masses = np.array([0.10, 0.12, 0.10]), np.array([0.12, 0.20, 0.28])
+    assert problem.body.lengths == pytest.approx(lengths / 0.32)
+    assert problem.body.weights == pytest.approx(masses / 0.6)
+    # counter-clockwise seen from above: the second joint counts the other way round
+    assert problem.joint_limit == ((-0.5, 1.2), (-1.2, 0.5))
+    robot = problem.robot
+    assert (robot.length, robot.mass, robot.period) == pytest.approx((0.32, 0.6, 2.0))
+    assert (robot.max_speed, robot.max_torque) == (5.0, 1.5)
+    assert "j1 = joint_1, j2 = -joint_2" in capsys.readouterr().out
+    assert "j1 = joint_1, j2 = -joint_2" in (tmp_path / "mine.py").read_text(encoding="utf-8")
+    # without a period nothing is in SI units
+    assert read(tmp_path, WORM).robot is None
+
+
+def test_what_is_fixed_is_one_link_and_a_chain_may_begin_anywhere(tmp_path):
+    box = '<visual><geometry><box size="0.2 0.1 0.1"/></geometry></visual>'
+    turned = [
+        link("base", 0.3, more=box),  # from -0.1 to 0.1
+        link("cap", 0.1),
+        link(
+            "front",
+            0.2,
+            "0.1 0 0",
+            more=box.replace("<geometry>", '<origin xyz="0.1 0 0"/><geometry>'),
+        ),
+        link("rear", 0.2, "-0.1 0 0"),
+        joint("lid", "base", "cap", "0 0 0.05", kind="fixed"),
+        joint("ahead", "base", "front", "0.1 0 0", limit='<limit lower="-1" upper="0.4"/>'),
+        joint("behind", "base", "rear", "-0.1 0 0", limit='<limit lower="-1" upper="0.6"/>'),
+    ]
+    problem = read(tmp_path, turned)
+    assert problem.body.lengths == pytest.approx([1 / 3] * 3)
+    assert problem.body.weights == pytest.approx([0.25, 0.5, 0.25])
+    # what turns the rear to the left bends the joint in front of it to the right
+    assert problem.joint_limit == ((-0.6, 1.0), (-1.0, 0.4))
+    # counted from the other end, if it is the one called the head
+    flipped = [x.replace('"front"', '"aft"').replace('"rear"', '"head"') for x in turned]
+    assert read(tmp_path, flipped).joint_limit == ((-0.4, 1.0), (-1.0, 0.6))
+
+
+def test_free_hinges_across_are_wheels_and_spheres_under_a_box_feet(tmp_path):
+    wheels = [
+        each
+        for name in LINKS
+        for side in (-1, 1)
+        for each in (
+            link(f"w{name}{side}", 0.01),
+            joint(
+                f"a{name}{side}",
+                name,
+                f"w{name}{side}",
+                f"0.05 {0.02 * side} 0",
+                "0 1 0",
+                "continuous",
+                "",
+            ),
+        )
+    ]
+    problem = read(tmp_path, [*WORM, *wheels], "--mu", "0.4")
+    offsets = sorted(foot.offset * 0.32 for foot in problem.body.feet)
+    assert offsets == pytest.approx([-0.02] * 3 + [0.02] * 3)
+    assert [foot.place for foot in problem.body.feet[::2]] == pytest.approx([0.5, 5 / 12, 0.5])
+    assert {foot.friction for foot in problem.body.feet} == {Wheel(0, sideways=0.4).friction}
+    assert problem.body.weights == pytest.approx(np.array([0.14, 0.22, 0.30]) / 0.66)
+    ball = '<collision><origin xyz="0.03 0 0"/><geometry><sphere radius="0.01"/></geometry></collision>'
+    box = '<visual><origin xyz="0.05 0 0"/><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
+    stands = [link(name, 0.1, "0.05 0 0", box + ball) for name in LINKS]
+    body = read(tmp_path, [*stands, *WORM[3:]]).body
+    assert [foot.place for foot in body.feet] == pytest.approx([0.3, 0.25, 0.3])
+    assert read(tmp_path, [*stands, *WORM[3:]], "--wheels").body.feet[0].kind == "wheel"
+
+
+def feet(body):
+    return [
+        (f.kind, f.link, *(round(x, 5) for x in (f.place, f.weight, f.offset, f.extent)))
+        for f in body.standing_on
+    ]
+
+
+@pytest.mark.parametrize("kind", ["urdf", "xml"])
+@pytest.mark.parametrize(
+    "body",
+    [
+        Chain((0.2, 0.3, 0.3, 0.2), width=0.02),
+        Chain((0.25, 0.35, 0.4), weights=(0.3, 0.3, 0.4), feet=1),
+        Chain((0.25, 0.35, 0.4), feet=(Foot(0, 0.2), Foot(1), Foot(2, 0.9))),
+    ],
+)
+def test_a_model_that_colloc_writes_is_read_as_the_same_body(kind, body, tmp_path):
+    limits = ((-1.0, 1.4), *(1.1, 1.2)[: body.n_joint - 1])
+    problem = Problem("there", body=body, friction=Friction(0.5, 0.5, 0.5), joint_limit=limits)
+    n = body.n_joint
+    gait = colloc.Fourier(np.zeros(n), 0.6 * np.eye(n)[:, :1], 0.6 * np.eye(n)[:, 1:2])
+    solution = colloc.evaluate(problem.with_(gait=Harmonic(1, "none")), gait)
+    path = tmp_path / f"robot.{kind}"
+    solution.export(path, period=4.0, length=0.8, mass=1.5)
+    back = read(tmp_path, None, "--period", "4", "--mu", "0.5", kind=kind)
+    assert back.body.lengths == pytest.approx(body.lengths, rel=1e-8)
+    assert back.body.mass_column() == pytest.approx(body.mass_column(), rel=1e-8)
+    assert back.body.weight_column() == pytest.approx(body.weight_column(), rel=1e-8)
+    assert feet(back.body) == feet(body)
+    assert back.joint_limit == limits
+    assert (back.robot.length, back.robot.mass) == pytest.approx((0.8, 1.5))
+
+
+def test_wheels_and_pads_come_back_from_mjcf(tmp_path):
+    parts = (
+        Wheel(0, 0.4, rolling=0.05, sideways=0.8),
+        Pad(1, 0.2, 0.7),
+        Wheel(2, rolling=0.05, sideways=0.8),
+    )
+    problem = Problem("there", body=Chain(feet=parts), gait=Harmonic(1, "none"))
+    gait = colloc.Fourier(np.zeros(2), 0.6 * np.eye(2)[:, :1], 0.6 * np.eye(2)[:, 1:])
+    solution = colloc.evaluate(problem, gait)
+    solution.export(tmp_path / "robot.xml", period=4.0, length=0.8, mass=1.5)
+    assert feet(read(tmp_path, None, kind="xml").body) == feet(problem.body)
+
+
+SWIMMER = """
+<mujoco>
+<compiler angle="degree"/>
+<default><geom type="capsule" size="0.01" mass="0.3"/><joint range="-100 100"/>
+<default class="weak"><joint range="-30 60"/></default></default>
+<worldbody>
+<geom type="plane" size="1 1 1"/>
+<body name="torso">
+<freejoint/>
+<geom fromto="0.19 0 0 0.01 0 0"/>
+<body name="mid" pos="0 0 0" euler="0 0 180">
+<joint name="rot2" axis="0 0 1"/>
+<geom fromto="0 0 0 0.2 0 0"/>
+<body name="back" pos="0.2 0 0">
+<joint name="rot3" class="weak" axis="0 0 1"/>
+<geom fromto="0.01 0 0 0.19 0 0"/>
+</body></body></body>
+</worldbody>
+</mujoco>
+"""
+
+
+def test_an_mjcf_has_classes_degrees_and_capsules(tmp_path, capsys):
+    problem = read(tmp_path, SWIMMER, kind="xml")
+    assert problem.body.lengths == pytest.approx([1 / 3] * 3)
+    assert problem.body.weights == ()
+    limits = [np.degrees(np.ravel(x)).tolist() for x in problem.joint_limit]
+    assert limits == [pytest.approx([100], rel=1e-5), pytest.approx([-30, 60], rel=1e-5)]
+    assert "rot2 = joint_1, rot3 = joint_2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ((link("leg"), joint("hip", "mid", "leg", "0 0 0")), ('link "mid" carries', "j2, hip", "no branches")),
+        ((link("leg"), joint("slot", "head", "leg", "0.1 0 0", kind="prismatic")), ('"slot" is prismatic', "fix it")),
+        ((link("leg"), joint("lift", "head", "leg", "0.1 0 0", "0 1 0")), ('"lift" is 90 degrees off', '"j1"', "fix it")),
+        ((link("leg"), joint("side", "head", "leg", "0 0.1 0")), ("on a line", "origins")),
+        ((link("leg"), joint("knee", "head", "leg", "0.1 0 0")), ('where link "leg" ends', "box")),
+        ((joint("knee", "head", "leg", "0.1 0 0"),), ('"knee" names a link', "not there")),
+        ((link("leg"),), ("lead from one link",)),
+        ((link("leg", at="0.1 0 0"), joint("k", "head", "leg", "0.1 0 0", limit='<limit upper="1"/>')), ('"k" goes from 0', "straight")),
+        ((link("leg", mass="big"), joint("k", "head", "leg", "0.1 0 0")), ("big", "finite")),
+    ],
+)  # fmt: skip
+def test_what_is_no_planar_chain_is_refused_by_name_and_with_a_cure(more, words, tmp_path, capsys):
+    assert read(tmp_path, [*WORM, *more]) == BAD_PROBLEM
+    said = capsys.readouterr().err
+    assert "robot.urdf" in said
+    for word in words:
+        assert word in said
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        ("<sdf/>", "<sdf>"),
+        ("no xml", "as XML"),
+        ("<robot xmlns:xacro='http://ros.org/wiki/xacro'><xacro:arm/></robot>", "xacro FILE"),
+        ("<mujoco><worldbody/></mujoco>", "0 bodies"),
+        ("<mujoco><include file='a.xml'/></mujoco>", "mj_saveLastXML"),
+    ],
+)
+def test_other_files_are_named_for_what_they_are(content, word, tmp_path, capsys):
+    assert read(tmp_path, content) == BAD_PROBLEM
+    assert word in capsys.readouterr().err
+
+
+def test_lengths_are_not_stated_twice(tmp_path, capsys):
+    assert read(tmp_path, WORM, "--links", "4") == BAD_PROBLEM
+    assert "--from and --links" in capsys.readouterr().err
+
+
+def test_a_limit_stated_on_the_command_line_is_the_limit(tmp_path):
+    assert read(tmp_path, WORM, "--joint-limit", "85deg").joint_limit == pytest.approx(
+        math.radians(85), abs=1e-5
+    )
