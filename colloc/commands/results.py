@@ -273,11 +273,14 @@ def report(options: argparse.Namespace) -> int:
 @cli.command(
     """\
 Orange arrows are the friction on the links; the large disc is the head; the small plane shows the
-first two joint angles.
+first two joint angles. Two results are shown side by side, at the same scale and time: body lengths
+and periods, or metres and seconds where both problems state a robot.
 
   colloc animate results/three_link.h5                            results/three_link.gif
+  colloc animate results/a.h5 results/b.h5                        results/a-b.gif
   colloc animate results/three_link.h5 --format mp4 --fps 50      needs ffmpeg""",
     cli.RESULT,
+    ("beside", {"metavar": "OTHER.h5", "nargs": "?", "help": "another result, shown beside it"}),
     cli.option(
         str,
         "--format",
@@ -295,13 +298,17 @@ first two joint angles.
 )
 def animate(options: argparse.Namespace) -> int:
     source = Path(options.result)
-    solution = load(source)
-    path = cli.output_path(options, source, ("gif", "mp4"))
+    solution, other = load(source), options.beside and Path(options.beside)
+    beside = load(other) if other else None
+    both = source.with_name(f"{source.stem}-{other.stem}.gif") if other else source
+    path = cli.output_path(options, both, ("gif", "mp4"))
     # slow imports only now: a bad option is refused at once
     from colloc.pictures.movie import write_movie
 
     settings = cli.values(options, "periods", "seconds", "fps", "width", "from_rest")
-    write_movie(solution, path, **settings, arrows=not options.no_arrows, quiet=cli.quiet(options))
+    settings |= {"arrows": not options.no_arrows, "quiet": cli.quiet(options)}
+    names = (source.stem, other.stem) if other else ()
+    write_movie(solution, path, **settings, beside=beside, names=names)
     facts, kilobytes = _write(path)
     cli.tell(options, facts, [f"saved {path} ({kilobytes})"])
     return OK

@@ -1,20 +1,22 @@
 """Animations as GIF, or as MP4 where ffmpeg is installed: the body on the plane with the friction
-on its links, and the path in shape space beside it."""
+on its links, and beside it the path in shape space, or another gait."""
 
 from __future__ import annotations
 
 import shutil
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from colloc.mechanics.bodies import Body
 from colloc.pictures.figure import BodyMarks, draw_shape_path
 from colloc.pictures.style import GREY, INK, ORANGE, SKY, VERMILION, figure_style
 from colloc.results.motion import (
@@ -25,6 +27,7 @@ from colloc.results.motion import (
     lab_outline,
     rotate,
 )
+from colloc.results.robot import in_si
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import ProblemError
@@ -86,6 +89,54 @@ def frames(
     )
 
 
+class _Scene:
+    """A gait on axes that show the middle of its frames and `half` a side on from there."""
+
+    def __init__(
+        self, axes: Axes, body: Body, shown: Frames, half: np.ndarray, grid: float
+    ) -> None:
+        self._shown, middle = shown, 0.5 * sum(shown.window)
+        for axis, a, b in zip("xy", middle - half, middle + half, strict=True):
+            ticks = grid * np.arange(np.ceil(a / grid), np.floor(b / grid) + 1)
+            axes.set(**{f"{axis}ticks": ticks, f"{axis}lim": (a, b)})
+        axes.grid(color="#e8ecef", lw=0.8)
+        axes.tick_params(length=0, labelbottom=False, labelleft=False)
+        axes.spines[:].set_visible(False)
+        colours = (SKY, ORANGE, VERMILION)
+        self._trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in colours]
+        self._marks = BodyMarks(axes, body, INK, (4, 5, 9, 5, 8), ("o", VERMILION))
+        self._quiver: Any = None
+        if key := self._marks.key():
+            where: Any = {"loc": "lower right", "ncols": len(key), "borderaxespad": 0}
+            axes.legend(key.values(), key.keys(), **where)
+
+    def show_friction(self, axes: Axes, scale: float) -> None:
+        base = self._shown.arrow_base[:, :, 0]
+        self._scale = scale
+        # below a head's size the head shrinks too, so that weak friction looks weak
+        self._quiver = axes.quiver(
+            *base, *base, color=VERMILION, angles="xy", scale_units="xy", scale=1,
+            width=0.0024, headwidth=4, headlength=5, zorder=4,
+        )  # fmt: skip
+
+    def draw(self, number: int) -> np.ndarray:
+        """Its joint angles in the picture of this number."""
+        shown, motion = self._shown, self._shown.motion
+        period, k = divmod(number, motion.t.size - 1)
+        before = shown.before[period]
+        at = (shown.ends[:, :, k], motion.centre[:, k], shown.feet[..., k])
+        self._marks.place(map(before.of, at), shown.holding[:, k])
+        paths = shown.ends[:, 0], shown.ends[:, -1], motion.centre
+        for trail, path in zip(self._trails, paths, strict=True):
+            past = [earlier.of(path) for earlier in shown.before[:period]]
+            trail.set_data(*np.concatenate([*past, before.of(path[:, : k + 1])], axis=1))
+        if self._quiver is not None:
+            self._quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
+            forces = self._scale * rotate(shown.arrow[:, :, k], before.rotation)
+            self._quiver.set_UVC(*forces)
+        return motion.angles[:, k]
+
+
 def pictures(
     solution: Solution,
     count: int,
@@ -94,69 +145,74 @@ def pictures(
     arrows: bool = True,
     width: int = 900,
     from_rest: bool = False,
+    beside: Solution | None = None,
+    names: Sequence[str] = (),
 ) -> Iterator[np.ndarray]:
-    """Images ``(height, width, 3)`` of bytes, `count` a period, of an even width [pixels]."""
-    problem, body = solution.problem, solution.problem.body
-    if from_rest:
-        motion = solution.from_rest(np.linspace(0.0, periods, periods * count + 1))
-        shown = frames(solution, periods=1, motion=motion)
-    else:
-        shown = frames(solution, count + 1, periods=periods)
-    motion, (low, high) = shown.motion, shown.window
-    planar = problem.gait.free and body.n_joint >= 2
-    share, span = 0.68 if planar else 0.97, high - low
+    """Images ``(height, width, 3)`` of bytes, `count` a period, of an even width [pixels].
+
+    A gait `beside` is shown at the same scale and time: body lengths and periods, or metres and
+    seconds where both problems state a robot, `count` pictures in the longer period.
+    """
+    both = [solution, *([] if beside is None else [beside])]
+    alone, facts = beside is None, [in_si(each) for each in both]
+    real = not alone and all(facts)
+    sizes = [each.problem.robot.length if real else 1.0 for each in both]  # type: ignore[union-attr]
+    times = [each["period_s"] if real else 1.0 for each in facts]
+    shown = []
+    for each, seconds in zip(both, times, strict=True):
+        a_period = max(2, round(count * seconds / max(times)))
+        number = -(-periods * count // a_period)
+        if from_rest:
+            motion = each.from_rest(np.linspace(0.0, number, number * a_period + 1))
+            shown.append(frames(each, periods=1, motion=motion))
+        else:
+            shown.append(frames(each, a_period + 1, periods=number))
+    planar = alone and solution.problem.gait.free and solution.problem.body.n_joint >= 2
+    share = 0.68 if planar else 0.97 if alone else 0.48
+    windows = [
+        size * np.subtract(*each.window[::-1]) for size, each in zip(sizes, shown, strict=True)
+    ]
+    span = np.max(windows, axis=0)
     tall = float(np.clip(span[1] / span[0], 0.4, 0.9)) * share * width
     height = 2 * round((tall + 0.13 * width) / 2)
-    scale = max(span[0] / (share * width), span[1] / tall)  # body lengths of a pixel
-    middle, half = 0.5 * (low + high), 0.5 * scale * np.array([share * width, tall])
-    verdict = "" if solution.status == SOLVED else f"  ({solution.status})"
-    title = f"{problem.name}   {problem.objective.name} {solution.measured.value:.4f}{verdict}"
+    scale = max(span[0] / (share * width), span[1] / tall)  # lengths of a pixel
+    strength = min(each.arrow_scale for each in shown)
     with figure_style():
         figure = Figure(figsize=(width / 100, height / 100), dpi=100)
         figure.set_layout_engine("none")
-        canvas = FigureCanvasAgg(figure)
-        axes = figure.add_axes((0.015, 0.03, share, tall / height))
-        for axis, a, b in zip("xy", middle - half, middle + half, strict=True):
-            ticks = 0.2 * np.arange(np.ceil(a / 0.2), np.floor(b / 0.2) + 1)  # a grid of fifths
-            axes.set(**{f"{axis}ticks": ticks, f"{axis}lim": (a, b)})
-        axes.grid(color="#e8ecef", lw=0.8)
-        axes.tick_params(length=0, labelbottom=False, labelleft=False)
-        axes.spines[:].set_visible(False)
-        figure.text(0.015, 0.93, title, fontsize=11, weight="bold")
-        phase = figure.text(share, 0.93, "", fontsize=10, color=GREY, ha="right")
-        colours = (SKY, ORANGE, VERMILION)
-        trails = [axes.plot([], [], color=colour, lw=1)[0] for colour in colours]
-        marks = BodyMarks(axes, body, INK, (4, 5, 9, 5, 8), ("o", VERMILION))
-        if key := marks.key():
-            where: Any = {"loc": "lower right", "ncols": len(key), "borderaxespad": 0}
-            axes.legend(key.values(), key.keys(), **where)
-        if arrows:
-            base = shown.arrow_base[:, :, 0]
-            # below a head's size the head shrinks too, so that weak friction looks weak
-            quiver = axes.quiver(
-                *base, *base, color=VERMILION, angles="xy", scale_units="xy", scale=1,
-                width=0.0024, headwidth=4, headlength=5, zorder=4,
-            )  # fmt: skip
+        canvas, scenes = FigureCanvasAgg(figure), []
+        for k, (each, size, one) in enumerate(zip(both, sizes, shown, strict=True)):
+            left, bottom = 0.015 + 0.495 * k, 0.03 if alone else 0.095 * width / height
+            axes = figure.add_axes((left, bottom, share, tall / height))
+            half = 0.5 * scale / size * np.array([share * width, tall])
+            scenes.append(_Scene(axes, each.problem.body, one, half, 0.1 / size if real else 0.2))
+            if arrows:
+                scenes[-1].show_friction(axes, strength)
+            title = f"{names[k] if names else each.problem.name}   "
+            value = f"{each.problem.objective.name} {each.measured.value:.4f}"
+            value += "" if each.status == SOLVED else f"  ({each.status})"
+            if alone:
+                figure.text(left, 0.93, title + value, fontsize=11, weight="bold")
+                continue
+            way = f"{each.distance:.4f} body lengths a period"
+            if real:
+                way = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s, {times[k]:.3g} s a period"
+            figure.text(left, 0.085 * width / height, title, fontsize=11, weight="bold", va="top")
+            figure.text(left, 0.055 * width / height, f"{way}; {value}", fontsize=9, va="top")
+        right, unit = (share if alone else 0.99), " s" if real else ""
+        top = 0.93 if alone else 1 - 0.028 * width / height
+        clock = figure.text(right, top, "", fontsize=10, color=GREY, ha="right")
         if planar:
             plane = figure.add_axes((0.755, 0.2, 0.235, 0.62))
             draw_shape_path(plane, solution)
             (dot,) = plane.plot([], [], "o", color=VERMILION, mec="white", ms=8, zorder=5)
-        whole = f"{len(shown.before) * motion.t[-1]:g}"
         for number in range(periods * count):
-            period, k = divmod(number, motion.t.size - 1)
-            before = shown.before[period]
-            at = (shown.ends[:, :, k], motion.centre[:, k], shown.feet[..., k])
-            marks.place(map(before.of, at), shown.holding[:, k])
-            paths = shown.ends[:, 0], shown.ends[:, -1], motion.centre
-            for trail, path in zip(trails, paths, strict=True):
-                past = [earlier.of(path) for earlier in shown.before[:period]]
-                trail.set_data(*np.concatenate([*past, before.of(path[:, : k + 1])], axis=1))
-            if arrows:
-                quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
-                quiver.set_UVC(*shown.arrow_scale * rotate(shown.arrow[:, :, k], before.rotation))
+            for scene in scenes:
+                angles = scene.draw(number)
             if planar:
-                dot.set_data(motion.angles[:1, k], motion.angles[1:2, k])
-            phase.set_text(f"t = {period + motion.t[k]:.2f} of {whole}")
+                dot.set_data(angles[:1], angles[1:2])
+            now, whole = (max(times) * x for x in (number / count, periods))
+            clock.set_text(f"t = {now:.2f} of {whole:.4g}{unit}")
             canvas.draw()
             yield np.asarray(canvas.buffer_rgba())[:height, :width, :3].copy()
 
@@ -214,6 +270,8 @@ def write_movie(
     width: int = 900,
     arrows: bool = True,
     from_rest: bool = False,
+    beside: Solution | None = None,
+    names: Sequence[str] = (),
     quiet: bool = True,
 ) -> Path:
     """Write the motion as GIF or MP4.
@@ -234,6 +292,11 @@ def write_movie(
         Draw friction.
     from_rest : bool
         Show the first periods of a body with inertia that starts at rest.
+    beside : Solution, optional
+        Another gait, shown at the same scale and time: body lengths and periods, or metres and
+        seconds where both problems state a robot; `seconds` are of the longer period then.
+    names : sequence of str
+        What stands at both gaits, by default the names of their problems.
     quiet : bool
         Show no progress.
 
@@ -253,11 +316,13 @@ def write_movie(
     writers = {".gif": write_gif, ".mp4": write_mp4}
     if path.suffix not in writers:
         raise ProblemError(f"{path} should end in .gif or .mp4.")
-    solution.gait  # noqa: B018  raises where there is none
+    for each in (solution, *([] if beside is None else [beside])):
+        each.gait  # noqa: B018  raises where there is none
     begin, even, total = time.monotonic(), 2 * (width // 2), periods * count
 
     def with_progress(line: StatusLine) -> Iterator[np.ndarray]:
-        drawn = pictures(solution, count, periods, arrows=arrows, width=even, from_rest=from_rest)
+        how: Any = {"arrows": arrows, "width": even, "from_rest": from_rest}
+        drawn = pictures(solution, count, periods, **how, beside=beside, names=names)
         for k, picture in enumerate(drawn, 1):
             line.say(f"picture {k} of {total}", (time.monotonic() - begin) / k * (total - k))
             yield picture

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import colloc
 from colloc.commands.results import animate as main
 from colloc.pictures.figure import save_panels
 from colloc.pictures.movie import frames, pictures, write_movie
@@ -50,6 +51,45 @@ def test_gif_has_the_pictures_and_the_pace_asked_for(three_link, tmp_path, capsy
     with Image.open(tmp_path / "x.gif") as image:
         found = image.n_frames, image.info["duration"], image.info["loop"], image.size[0]
         assert found == (10, 100, 0, 300)
+
+
+def extents(picture):
+    """Widths and heights of the bodies in both halves, without the texts."""
+    tall, wide, _ = picture.shape
+    halves = picture[40 : tall - 100, : wide // 2], picture[40 : tall - 100, wide // 2 :]
+    return [[np.ptp(x) for x in np.nonzero(half.max(axis=2) < 80)] for half in halves]
+
+
+def test_a_gait_beside_itself_is_drawn_twice_alike(three_link, tmp_path, capsys):
+    for picture in pictures(three_link, 3, 2, width=1000, beside=three_link):
+        left, right = extents(picture)
+        assert left == right
+        assert max(left) > 100
+    files = [str(save(three_link, tmp_path / f"{name}.h5")) for name in "ab"]
+    assert main([*files, "--periods", "1", "--seconds", "1", "--fps", "5"]) == 0
+    with Image.open(tmp_path / "a-b.gif") as image:
+        assert (image.n_frames, image.size[0]) == (5, 900)
+
+
+def test_robots_side_by_side_are_drawn_in_metres_and_seconds():
+    """One of half the length and a quarter of the period, at so slow a pace that both do the
+    same."""
+    big, small = (
+        colloc.evaluate(
+            colloc.Problem(
+                "robot",
+                gait=colloc.Harmonic(1),
+                robot=colloc.Robot(length=length, mass=1, period=period),
+            ),
+            colloc.ellipse(A0=0, A1=1.5, B1=1.0),
+        )
+        for length, period in ((0.6, 400), (0.3, 100))
+    )
+    drawn = [extents(picture) for picture in pictures(big, 8, 1, arrows=False, beside=small)]
+    lines = 9.0  # of joints and head, whose size does not change [pixels]
+    (long, short), (_, again) = drawn[0], drawn[2]
+    np.testing.assert_allclose(np.subtract(long, lines), 2 * np.subtract(short, lines), atol=9)
+    np.testing.assert_allclose(again, short, atol=2)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
