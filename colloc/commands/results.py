@@ -289,7 +289,7 @@ and periods, or metres and seconds where both problems state a robot.
         choices=("gif", "mp4"),
     ),
     cli.option(int, "--periods", "N", "periods in a row (default: 2)", 2),
-    cli.option(float, "--seconds", "S", "per period (default: 4)", 4.0),
+    cli.option(float, "--seconds", "S", "per period (default: that of the robot, or 4)"),
     cli.option(float, "--fps", "N", "frames per second (default: 20)", 20.0),
     cli.option(int, "--width", "PIXELS", "default: 900", 900),
     cli.flag("--from-rest", "with inertia: the first periods of a body that starts at rest"),

@@ -155,7 +155,7 @@ def pictures(
     """
     both = [solution, *([] if beside is None else [beside])]
     alone, facts = beside is None, [in_si(each) for each in both]
-    real = not alone and all(facts)
+    real = all(facts)
     sizes = [each.problem.robot.length if real else 1.0 for each in both]  # type: ignore[union-attr]
     times = [each["period_s"] if real else 1.0 for each in facts]
     shown = []
@@ -192,6 +192,8 @@ def pictures(
             value = f"{each.problem.objective.name} {each.measured.value:.4f}"
             value += "" if each.status == SOLVED else f"  ({each.status})"
             if alone:
+                if real:
+                    value = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s   (squares of 10 cm)"
                 figure.text(left, 0.93, title + value, fontsize=11, weight="bold")
                 continue
             way = f"{each.distance:.4f} body lengths a period"
@@ -203,7 +205,7 @@ def pictures(
         top = 0.93 if alone else 1 - 0.028 * width / height
         clock = figure.text(right, top, "", fontsize=10, color=GREY, ha="right")
         if planar:
-            plane = figure.add_axes((0.755, 0.2, 0.235, 0.62))
+            plane = figure.add_axes((0.77, 0.2, 0.22, 0.62))
             draw_shape_path(plane, solution)
             (dot,) = plane.plot([], [], "o", color=VERMILION, mec="white", ms=8, zorder=5)
         for number in range(periods * count):
@@ -265,7 +267,7 @@ def write_movie(
     path: Path,
     *,
     periods: int = 2,
-    seconds: float = 4.0,
+    seconds: float | None = None,
     fps: float = 20.0,
     width: int = 900,
     arrows: bool = True,
@@ -282,8 +284,8 @@ def write_movie(
     path : Path
         Ends in ``.gif`` or ``.mp4``.
     periods : int
-    seconds : float
-        Per period.
+    seconds : float, optional
+        Per period; by default as long as a robot takes, up to 20, or 4.
     fps : float
         Frames per second.
     width : int
@@ -305,6 +307,10 @@ def write_movie(
     ProblemError
         If a number or the ending of the path is unusable, there is no gait, or no ffmpeg for MP4.
     """
+    if seconds is None:
+        robots = [in_si(each) for each in (solution, beside) if each is not None]
+        real = [facts["period_s"] for facts in robots if facts]
+        seconds = float(np.clip(max(real), 1.0, 20.0)) if real else 4.0
     count = round(seconds * fps) if np.isfinite(seconds * fps) else 0
     if periods < 1 or count < 2 or periods * count > _MOST_PICTURES:
         raise ProblemError(

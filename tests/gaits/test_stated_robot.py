@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import colloc
 from colloc import Chain, Free, Harmonic, Problem, ProblemError, Robot
@@ -147,3 +148,12 @@ def test_a_period_that_is_sought_keeps_the_speed_of_the_motors():
     stated = problem.with_(robot=replace(robot, period=period))
     again = colloc.solve(stated.with_(guess=replace(solution.gait, log_period=None)), starts=1)
     assert again.value == pytest.approx(solution.value, rel=1e-3)
+
+
+def test_a_film_of_a_robot_takes_its_time(tmp_path):
+    robot = replace(SLOW, period=1.5, max_speed=None)
+    problem = Problem("quick", gait=Harmonic(1, "antipodal"), robot=robot, delta=1e-2)
+    solution = colloc.evaluate(problem, colloc.ellipse(0.0, 1.5, 1.0))
+    path = solution.animate(tmp_path / "a.gif", periods=1, fps=10, width=200)
+    with Image.open(path) as film:
+        assert film.n_frames * film.info["duration"] == pytest.approx(1500)
