@@ -20,6 +20,7 @@ from scipy.special import fdtrc, stdtrit
 from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.record import FEWEST, LARGEST, read_record
+from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
 
 _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
@@ -66,6 +67,8 @@ class FittedGait:
     uncertainty: Uncertainty | None = None  # None for a series
     taken: str = ""  # `colloc.gaits.record.Record.taken`
     centre: int = 0  # `colloc.gaits.record.Record.centre`
+    path: np.ndarray | None = None  # of centre and tail over a period, (2, 2, n_time)
+    went: float = 0.0  # distance of the centre a period, mean over the record [body lengths]
 
     def describe(self) -> str:
         if not self.samples:
@@ -94,14 +97,15 @@ def fitted_gait(
     period: float | None = None,
     harmonics: int | None = None,
     degrees: bool = False,
+    body: Chain | None = None,
 ) -> FittedGait:
     """Fit a gait to joint angles; `period` is in the unit of time of a file, and `degrees` holds
-    where a file names no unit."""
+    where a file names no unit. Markers may tell the angles of a `body`."""
     name, record = "the gait", None
     if isinstance(source, Fourier):
         angles = source.mean[:, None]
     elif isinstance(source, (str, os.PathLike)):
-        name, record = str(source), read_record(Path(source), n_joint, degrees=degrees)
+        name, record = str(source), read_record(Path(source), n_joint, degrees=degrees, body=body)
         time, angles, degrees = record.time, record.angles, record.degrees
         period = period or record.period
     elif callable(source):
@@ -130,7 +134,23 @@ def fitted_gait(
         )
     samples = _Samples(name, time - time[0], angles, degrees)
     fitted = samples.gait(samples.best_fit(period, harmonics))
-    return replace(fitted, taken=record.taken, centre=record.centre) if record else fitted
+    if record is None:
+        return fitted
+    fitted = replace(fitted, taken=record.taken, centre=record.centre)
+    return fitted if record.path is None else _with_path(fitted, samples, record.path)
+
+
+def _with_path(fitted: FittedGait, samples: _Samples, path: np.ndarray) -> FittedGait:
+    """A gait with what the markers went in its period; a step beyond the record, where a period
+    ends without its last sample, they go straight on."""
+    end, step = samples.time[-1], samples.step
+    time = np.append(samples.time, end + 2 * step)
+    path = np.append(path, path[..., -1:] + 2 * (path[..., -1:] - path[..., -2:-1]), axis=2)
+    begin = samples.time[samples.time + fitted.period <= end + 1.5 * step]
+    x, y = (np.interp(begin + fitted.period, time, row) for row in path[0])
+    steps = np.hypot(x - path[0, 0, : begin.size], y - path[0, 1, : begin.size])
+    went = float(steps.mean()) if begin.size else 0.0
+    return replace(fitted, path=path[..., time <= fitted.period + 0.5 * step], went=went)
 
 
 def _numbers(name: str, source: object) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
+from colloc.mechanics.chain import Chain
 from colloc.system.csv_table import Table, check_size, is_blank, read_table
 from colloc.system.errors import ProblemError
 
@@ -39,6 +40,7 @@ _ROUNDED = 0.15  # share of unequal time steps from which equal steps were round
 _MOST = 5_000  # samples; of more, every second, third ... is taken
 _CENTRED = np.radians(20)
 """Servos that know no negative angles are centred within it of a right angle."""
+_ASTRAY = 0.03  # distance of markers from what is a link, in body lengths, that is refused
 
 
 class Record(NamedTuple):
@@ -48,6 +50,7 @@ class Record(NamedTuple):
     period: float | None  # that the file states, in its unit of time
     taken: str  # what was read, and what was left out, in one sentence without its full stop
     centre: int  # right angle about which servos are centred [degrees]; 0 if about none
+    path: np.ndarray | None  # centre of mass and tail that markers tell, x and y, (2, 2, n_time)
 
 
 class _Column(NamedTuple):
@@ -89,12 +92,14 @@ class _Column(NamedTuple):
         return "place" if {*words} & {*"xyz"} and not {*words} & {"joint", "angle"} else "angle"
 
 
-def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
+def read_record(
+    path: Path, n_joint: int, *, degrees: bool = False, body: Chain | None = None
+) -> Record:
     """Read joint angles over time from a text file, a line a sample; `degrees` holds where the file
-    does not name a unit."""
+    does not name a unit. With a `body` markers at its ends and joints tell them, too."""
     table = read_table(path)
     check_size(path, table, FEWEST)
-    columns, clock, joints, how = _columns(path, table, n_joint)
+    columns, clock, joints, how = _columns(path, table, n_joint, body)
     time, unit = _times(path, table, clock)
     rows, notes = _rows(path, table, time, clock, joints)
     if re.search(r"^#\s*ramp_s:", table.preamble, re.M):
@@ -115,9 +120,14 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
     if (every := -(-rows.size // _MOST)) > 1:
         time, rows = time[::every], rows[::every]
         notes.append(f"of {len(table.lines)} rows, one in {every} taken")
-    units = _units(path, table, joints, degrees)
-    raw = table.values[rows][:, [column.at for column in joints]].T
-    _check_size_of_angles(path, joints, raw, units)
+    raw, places = table.values[rows][:, [column.at for column in joints]].T, None
+    if body is not None and joints[0].kind == "place":
+        units = np.ones(n_joint)
+        raw, places, length = _from_markers(path, raw.reshape(-1, 2, rows.size), body)
+        how = f"{how}, {length:.4g} of them a body length,"
+    else:
+        units = _units(path, table, joints, degrees)
+        _check_size_of_angles(path, joints, raw, units)
     angles = np.unwrap(raw * units[:, None], discont=1.5 * np.pi, axis=1)
     angles -= 2 * np.pi * np.round(angles.mean(axis=1, keepdims=True) / (2 * np.pi))
     if turned := _names(joints, np.abs(angles - raw * units[:, None]).max(axis=1) > 1.0):
@@ -130,7 +140,8 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
     mixed = f" (but {_names(joints, in_degrees)} degrees)" if in_degrees.any() else ""
     angle_unit = "degrees" if in_degrees.all() else f"radians{mixed}"
     plural = "s" * (n_joint > 1)
-    facts = [f"read {n_joint} joint{plural} {how} from {_ends(joints)}, {angle_unit}"]
+    facts = [f"read {n_joint} joint{plural} {how} from {_ends(joints)}"]
+    facts[0] += f", {angle_unit}" if places is None else ""
     facts += [f"time {unit}{even}", *table.notes, *notes]
     stated = re.search(r"^#\s*period_s:\s*([\d.eE+-]+)\s*$", table.preamble, re.M)
     period = float(stated[1]) if stated and unit == "in s" else None
@@ -138,7 +149,8 @@ def read_record(path: Path, n_joint: int, *, degrees: bool = False) -> Record:
     right = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
     centred = n_joint > 1 and np.abs(centres - right).max() < _CENTRED
     centre = int(np.degrees(right).round()) if centred else 0
-    return Record(time - time[0], angles, bool(in_degrees.all()), period, "; ".join(facts), centre)
+    taken = "; ".join(facts)
+    return Record(time - time[0], angles, bool(in_degrees.all()), period, taken, centre, places)
 
 
 def _names(columns: list[_Column], which: np.ndarray) -> str:
@@ -150,7 +162,7 @@ def _ends(columns: list[_Column]) -> str:
 
 
 def _columns(
-    path: Path, table: Table, n_joint: int
+    path: Path, table: Table, n_joint: int, body: Chain | None
 ) -> tuple[list[_Column], list[_Column], list[_Column], str]:
     """All named columns; those of times, if any; those of the joints, and how they are known."""
     if not table.names:
@@ -178,12 +190,16 @@ def _columns(
     clock = [whole, part] if whole and part else (times or counts or others)[:1]
     numeric = np.isfinite(table.values).any(axis=0)
     may_be = [column for column in columns if column not in clock and numeric[column.at]]
-    return columns, clock, *_joints(path, may_be, n_joint)
+    return columns, clock, *_joints(path, may_be, n_joint, body)
 
 
-def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Column], str]:
+def _joints(
+    path: Path, columns: list[_Column], n_joint: int, body: Chain | None
+) -> tuple[list[_Column], str]:
     angles = [column for column in columns if column.kind == "angle"]
     places = [column for column in columns if column.kind == "place"]
+    if not angles and places and body is not None:
+        return _markers(path, places, n_joint + 2), "from positions of points"
     if not angles and places:
         _refuse(
             path,
@@ -226,6 +242,45 @@ def _joints(path: Path, columns: list[_Column], n_joint: int) -> tuple[list[_Col
     if not in_order or any(column.last("end") for column in angles):
         _refuse(path, f"the order of the columns {', '.join(c.name for c in angles)} is not clear")
     return angles, "in the file's order, tail to head,"
+
+
+def _markers(path: Path, columns: list[_Column], n_point: int) -> list[_Column]:
+    """The columns x and y of all points, from tail to head."""
+    sides = [
+        sorted((c for c in columns if axis in c.words), key=lambda column: column.numbers)
+        for axis in "xy"
+    ]
+    x, y = ([column.numbers for column in side] for side in sides)
+    if x != y or len({*x}) < len(x) or len(x) != n_point:
+        raise ProblemError(
+            f"{path}: its columns {_ends(columns)} are x of {len(x)} points and y of {len(y)}; a "
+            f"body of {n_point - 1} links has {n_point} points, its ends and joints: call them "
+            f"x_1, y_1 (the tail), x_2, ..."
+        )
+    return [column for pair in zip(*sides, strict=True) for column in pair]
+
+
+def _from_markers(
+    path: Path, places: np.ndarray, body: Chain
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Joint angles that points ``(n_link + 1, 2, n_time)`` tell, the path of the centre of mass and
+    the tail in body lengths, and the body length in the unit of the points."""
+    points = places[:, 0] + 1j * places[:, 1]
+    links = np.diff(points, axis=0)
+    lengths = np.abs(links).mean(axis=1)
+    length = float(lengths.sum())
+    off = np.abs(lengths / length - body.lengths)
+    if not off.max() <= _ASTRAY:
+        k = int(off.argmax())
+        raise ProblemError(
+            f"{path}: points {k + 1} and {k + 2} are {lengths[k] / length:.3g} of the body apart, "
+            f"and that link is {body.lengths[k]:.3g} long: points must be at the ends and joints, "
+            f"from tail to head."
+        )
+    middles = 0.5 * (points[:-1] + points[1:])
+    path_of = np.stack([body.mass_column()[:, 0] @ middles, points[0]]) / length
+    angles = np.angle(links[1:] * links[:-1].conj())
+    return angles, np.stack([path_of.real, path_of.imag], axis=1), length
 
 
 def _refuse_count(path: Path, count: int, n_joint: int) -> NoReturn:

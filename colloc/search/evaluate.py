@@ -17,6 +17,7 @@ from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.densities import JointMap
 from colloc.numerics.mesh import Mesh
@@ -25,7 +26,7 @@ from colloc.reduced.motion import ReducedMotion
 from colloc.reduced.program import SearchSpace
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
-from colloc.results.solution import Solution
+from colloc.results.solution import Solution, direction_of_travel
 from colloc.search.certify import certify, goes_nowhere
 from colloc.search.confirm import answer_of_iterate
 from colloc.search.iterate import evaluate_at
@@ -92,6 +93,7 @@ def evaluate(
         period=period,
         harmonics=harmonics,
         degrees=degrees,
+        body=problem.body if isinstance(problem.body, Chain) and not problem.joint_map else None,
     )
     series = fitted.gait
     if (
@@ -154,6 +156,12 @@ def evaluate(
         certificate = certificate.with_samples(errors)
     message = f"{fitted.describe()}.{said}"
     solution = Solution(stated, answer, certificate, message=message, settings=settings())
+    if fitted.path is not None and fitted.went and certificate.replayed:
+        solution.message += (
+            f" The points went {fitted.went:.3g} body lengths a period, "
+            f"{direction_of_travel(*fitted.path)}; predicted {certificate.distance:.3g} +- "
+            f"{certificate.errors['distance']:.0e}, {solution.travels}."
+        )
     solution.seconds = time.monotonic() - begin
     return solution
 

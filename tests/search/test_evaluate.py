@@ -1,6 +1,8 @@
 """A gait of one's own: whatever way the angles are given, what comes out is what a replay of them
 says."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,49 @@ def test_it_is_what_a_replay_of_the_angles_says(evaluated):
     assert {"replay gap", "mesh error", "self-contact"} <= checked
     assert not {"KKT error", "second order"} & checked
     assert evaluated.standing == ["none: the gait was given"]
+
+
+LINKS = (0.3, 0.45, 0.25)
+
+
+def filmed(path, time, lengths=LINKS, names="x_{} y_{}"):
+    """Points of a body of 250 pixels with the gait, whose centre goes 0.05 of its length a period."""
+    turns = np.vstack([0 * time, np.cumsum(GAIT.angles(time), axis=0)])[: len(lengths)]
+    links = np.array(lengths)[:, None] * np.exp(1j * (turns + 0.4 * np.sin(2 * np.pi * time)))
+    points = np.vstack([0 * time, np.cumsum(links, axis=0)])
+    points -= np.array(lengths) @ (0.5 * (points[:-1] + points[1:]))
+    points = 250 * (points + (0.03 - 0.04j) * time) + 700 + 300j
+    rows = np.stack([points.real, points.imag], axis=1).reshape(-1, time.size)
+    header = ",".join(names.format(k, k).replace(" ", ",") for k in range(len(points)))
+    return written(path, time, rows, f"t,{header}")
+
+
+@pytest.mark.parametrize("time", [np.arange(121) / 60, np.arange(120) / 120])
+def test_points_of_the_body_tell_its_angles_and_how_far_it_went(time, tmp_path):
+    body = colloc.Chain(LINKS)
+    path = filmed(tmp_path / "film.csv", time)
+    angles = fitted_gait(path, 2, body=body).gait.angles(T)
+    np.testing.assert_allclose(angles, GAIT.angles(T), atol=1e-6)
+    found = colloc.evaluate(PROBLEM.with_(body=body), path)
+    assert "250 of them a body length" in found.message
+    went = float(re.search(r"went ([\d.]+) body lengths a period", found.message)[1])
+    assert went == pytest.approx(0.05, rel=0.01)
+    assert f"predicted {found.distance:.3g} +- " in found.message
+    assert found.message.endswith(f"{found.travels}.")
+
+
+@pytest.mark.parametrize(
+    ("how", "says"),
+    [
+        ({"names": "x_{} y_{}", "lengths": (0.5, 0.5)}, "x of 3 points .* of 3 links has 4 points"),
+        ({"names": "m{}_x m{}_z"}, "y of 0; a body"),
+        ({"lengths": (0.3, 0.3, 0.4)}, "points 2 and 3 are 0.3 of the body apart, .* is 0.45 long"),
+    ],
+)
+def test_points_that_are_not_those_of_the_body_are_refused(how, says, tmp_path):
+    path = filmed(tmp_path / "film.csv", T, **how)
+    with pytest.raises(colloc.ProblemError, match=says):
+        fitted_gait(path, 2, body=colloc.Chain(LINKS))
 
 
 def test_every_way_to_give_a_gait_gives_the_same_one(tmp_path):
