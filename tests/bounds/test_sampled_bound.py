@@ -135,6 +135,8 @@ def test_every_shape_has_a_representative_in_the_fundamental_domain():
     q, _ = random_points(4, 500)
     images = [q, -q, q[::-1], -q[::-1]]
     assert np.any([fundamental(Chain(), image) for image in images], axis=0).all()
+    skew = Chain((0.2, 0.3, 0.5))  # its ends are no images of each other
+    assert np.any([fundamental(skew, image) for image in images[:2]], axis=0).all()
 
 
 def test_largest_gain_is_the_maximum_over_heading():

@@ -8,18 +8,20 @@ import h5py
 import numpy as np
 import pandas
 import pytest
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from colloc.commands.results import export as main
 from colloc.commands.solve import summary_lines
 from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
 from colloc.gaits.problem import Problem
 from colloc.laws.resistance import Viscous
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction
 from colloc.pictures.report_page import report_page
 from colloc.results.store import save
 from colloc.smooth.modal_body import ModalBody
 from colloc.system.errors import ProblemError
+from colloc.verification.differential_motion import GaitWithInertia
 from colloc.verification.replay import replay
 from colloc.verification.trajectory import plan_trajectory
 
@@ -132,6 +134,25 @@ def test_the_body_ends_where_the_samples_take_it(three_link, tmp_path):
     way = tail + np.exp(1j * theta[-1]) * end - start
     np.testing.assert_allclose(stated["end_body_lengths"], [way.real, way.imag], atol=2e-3)
     assert stated["end_turned_deg"] == pytest.approx(np.degrees(theta[-1]), abs=0.3)
+
+
+def test_with_inertia_the_body_ends_where_one_run_through_all_samples_takes_it(unsolved, tmp_path):
+    """From rest, through more periods than are followed until all are alike."""
+    bent, body = Fourier([1.0, -1.0], [[0.1], [0.0]], [[0.0], [0.1]]), Chain()
+    solution = unsolved(Problem("bent", bent, gait=Harmonic(1), delta=1e-2))
+    how = {"period": 1.0, "rate": 400.0, "periods": 12, "length": 9.81, "mass": 1.0}
+    stated = solution.export(tmp_path / "x.csv", **how)
+    assert stated["end_includes_inertia"]
+    assert stated["ramp_s"] > 2  # of a period, at a Froude number of 1
+    time, *rows = written(tmp_path / "x.csv")
+    first, long = np.flatnonzero(time >= 0)[0], 12.0 + stated["ramp_s"]
+    angles, speeds = (np.append(row, row[:, [first]], axis=1) for row in rows)
+    phases = np.linspace(0.0, 1.0, time.size + 1)
+    path = CubicHermiteSpline(phases, angles, long * speeds, axis=1)
+    at = body, Friction(), lambda t: (path(t), path(t, 1)), 1e-2 * long
+    whole = GaitWithInertia(*at, froude=1 / long**2).run(np.zeros(3), 1e-5).states[3:6, -1]
+    assert stated["end_turned_deg"] == pytest.approx(np.degrees(whole[0]), abs=0.05)
+    assert stated["end_body_lengths"] == pytest.approx(whole[1:], abs=1e-3)
 
 
 def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_path, capsys):

@@ -77,6 +77,14 @@ def test_inertia_counts_from_a_thousandth_of_friction_on():
     assert "period" in free.objective.uses
 
 
+def test_electronics_draw_as_much_in_a_period_that_is_sought_as_in_one_that_is_stated():
+    times = {"fixed": 7.0, "free": (5.0, 10.0)}
+    robots = {name: replace(SLOW, period=time, max_speed=None) for name, time in times.items()}
+    fixed, free = (Problem(name, robot=robot).objective for name, robot in robots.items())
+    period = {"distance": 0.2, "driven_work": 0.6, "period": 7.0 / (0.62 / 9.81) ** 0.5}
+    assert free(period) == pytest.approx(fixed(period), rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -106,6 +114,8 @@ def test_speed_and_energy_are_those_of_the_period_in_metres_and_joules(slow_robo
     assert facts["energy_J_per_m"] == pytest.approx(
         (motors + 0.01 * 600) / (slow_robot.distance * 0.62)
     )
+    power = facts["energy_J_per_m"] * facts["speed_m_per_s"]
+    assert facts["mean_battery_power_W"] == pytest.approx(power)
     # the best value is the inverse of this cost, in weights
     assert slow_robot.value == pytest.approx(0.9 * 9.81 / facts["energy_J_per_m"], rel=1e-9)
     sheet = slow_robot.robot()

@@ -10,6 +10,7 @@ from colloc import (
     Fourier,
     Friction,
     Harmonic,
+    Pad,
     Problem,
     Solution,
     ellipse,
@@ -18,7 +19,7 @@ from colloc import (
     save,
 )
 from colloc.commands.solve import summary_lines
-from colloc.results.motion import arc
+from colloc.results.motion import arc, lab_feet, part_speeds
 
 SKEW = Fourier([0.3, -0.5], [[0.4], [0.9]], [[1.1], [-0.2]])
 
@@ -30,6 +31,19 @@ def test_a_turn_is_said_to_the_side_to_which_the_tail_link_turns():
         before, after = found.sample(np.array([0.0, 1.0])).theta
         side = "counter-clockwise" if after > before else "clockwise"
         assert f"° {side}," in found.turning
+
+
+def test_a_pad_is_as_fast_as_the_faster_of_its_ends(unsolved):
+    """So it sticks only where it does not turn either."""
+    body, gait = Chain(feet=tuple(Pad(k, 0.4, 0.6) for k in range(3))), {"gait": Harmonic(1)}
+    solution = unsolved(Problem("pads", ellipse(0.2, 1.2, 0.8), body, delta=1e-1, **gait))
+    t, step = np.linspace(0.06, 0.94, 12), 1e-5
+    before, after = (lab_feet(body, solution.sample(t + by)) for by in (-step, step))
+    ends = np.hypot(*(after - before)) / (2 * step)
+    name, speeds = part_speeds(body, solution.sample(t))
+    assert name == "foot"
+    assert (ends.max(axis=0) > 1.3 * ends.mean(axis=0)).mean() > 0.2  # they turn
+    np.testing.assert_allclose(speeds, ends.max(axis=0), atol=0.02 * speeds.max())
 
 
 def test_a_deliberately_poor_guess_reaches_the_paper_s_optimum(three_link):

@@ -189,8 +189,8 @@ def exact():
 
 @pytest.mark.parametrize("degrees", [0.1, 1.0])
 def test_stated_errors_hold_for_gaits_through_noisy_samples_and_grow_with_the_noise(exact, degrees):
-    rng, inside = np.random.default_rng(3), []
-    for _ in range(5):
+    rng, off = np.random.default_rng(3), []
+    for _ in range(10):
         noise = np.radians(degrees) * rng.normal(size=(2, N))
         noisy = colloc.evaluate(QUICK, GAIT.angles(np.arange(N) / N) + noise)
         stated = noisy.certificate
@@ -198,12 +198,15 @@ def test_stated_errors_hold_for_gaits_through_noisy_samples_and_grow_with_the_no
         assert stated.value_error == stated.efficiency_error
         told = f"leave d/W uncertain by {stated.of_samples[0]:.1e} (two standard deviations"
         assert told in noisy.message
-        inside += [
-            abs(noisy.efficiency - exact.efficiency) <= stated.efficiency_error,
-            abs(noisy.distance - exact.distance) <= stated.errors["distance"],
-            abs(noisy.work - exact.work) <= stated.errors["work"],
-        ]
-    assert sum(inside) >= 13  # of 15, 95 % each
+        wrong = (
+            (noisy.efficiency - exact.efficiency) / stated.efficiency_error,
+            (noisy.distance - exact.distance) / stated.errors["distance"],
+            (noisy.work - exact.work) / stated.errors["work"],
+        )
+        off.append(np.abs(wrong))
+    assert np.sum(np.array(off) <= 1) >= 27  # of 30, 95 % each
+    # stated are two standard deviations; of the work by no more than that
+    assert 0.25 < np.sqrt(np.mean(np.square(off), axis=0))[2] < 0.6
 
 
 @pytest.mark.parametrize("samples", [9, 12, 40])

@@ -134,6 +134,13 @@ def test_it_has_the_value_and_the_rows_of_the_reduced_program(case):
         start += cells.size
 
 
+@pytest.mark.parametrize("case", ["serpenoid of two harmonics", "antipodal serpenoid"])
+def test_with_another_lag_a_gait_is_no_member(case):
+    full, x, *_ = at_guess(stated(case))
+    x[full.layout.parameters[0, 0]] += 0.1
+    assert np.abs(rows(full, x)[full.groups["members"]]).max() > 1e-2
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_jacobian_and_hessian_are_differences_of_its_rows(case):
     full, x, *_ = at_guess(stated(case), 0.3)
