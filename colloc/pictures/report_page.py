@@ -17,8 +17,10 @@ from markupsafe import Markup, escape
 from colloc.bounds.optimality_gap import gap_line, upper_bound
 from colloc.gaits.problem_file import Reference, problem_file_text
 from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import link_width
 from colloc.mechanics.floor_contact import FOOT, PAD, WHEEL
+from colloc.mechanics.friction import Friction
 from colloc.mechanics.inertia import GRAVITY
 from colloc.pictures import render
 from colloc.pictures.figure import Panel, mesh_errors, panels, robot_panels
@@ -31,7 +33,7 @@ from colloc.system.arguments import checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import write_text
 
-_MOST_PLANES = 6
+_MOST_PLANES, _MOST_PLAYED = 6, 8
 _UNKNOWN = ProblemError, NotConvergedError
 _FILM, _FILM_FRAMES, _FILM_PERIODS = (320, 200), 24, 2  # largest size [pixels] of that of a card
 _FOOT_WORDS = {
@@ -87,6 +89,7 @@ def report_page(
         fields={name: json.dumps(value) for name, value in problem.to_dict().items()},
         source=solution.source or problem_file_text(problem),
         motion=_motion_data(frames(solution), problem.body),
+        toy=_toy(problem.body, problem.law),
         errors=float(mesh_errors(solution).sum()),
         gait_pictures=[
             *(
@@ -153,6 +156,36 @@ def _picture(
         "limits": (*axes.get_xlim(), *axes.get_ylim()),
         "joints": joints,
         "has_phase": has_phase,
+    }
+
+
+def _toy(body: Body, law: Any) -> dict[str, Any] | None:
+    """What sliders of a page need: of a chain up to eight links that lie on the floor."""
+    if (
+        type(body) is not Chain
+        or body.feet
+        or body.n_link > _MOST_PLAYED
+        or type(law) is not Friction
+    ):
+        return None
+    most = f"{5 * law.largest:.3g}"
+    waves = (("amplitude", 0, 150, 45), ("lag", -180, 180, 90), ("offset", -90, 90, 0))
+    coefficients = (
+        (
+            name,
+            f"{name} {how}",
+            f"{law.smallest / 10:.3g}",
+            most,
+            "any",
+            f"{getattr(law, name):.4g}",
+            "",
+        )
+        for name, how in zip(law.by_name, ("sideways", "forwards", "backwards"), strict=True)
+    )
+    return {
+        "body": {"lengths": body.lengths, "weights": body.weight_column()[:, 0].tolist()},
+        "sliders": [(name, name, low, high, 1, now, "°") for name, low, high, now in waves]
+        + [*coefficients],
     }
 
 

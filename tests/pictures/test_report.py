@@ -16,6 +16,7 @@ from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, load_problem
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.friction import Friction
 from colloc.pictures.movie import frames
 from colloc.pictures.report_page import report_page
 from colloc.results.checks import Check
@@ -23,6 +24,7 @@ from colloc.results.motion import lab_outline
 from colloc.results.solution import Solution
 from colloc.search.certify import certify
 from colloc.search.evaluate import evaluate
+from colloc.verification.replay import replay
 from tests.pictures.test_figure import crawler
 
 BROWSER = next(
@@ -114,7 +116,7 @@ def test_everything_from_the_file_is_escaped(three_link):
     page = report_page(evil, Reference(0.2, 0.1, EVIL), EVIL)
     seen = outline(page)
     assert "<img" not in page
-    assert len(re.findall("<script", page)) == 2  # the motion, and the page's own
+    assert len(re.findall("<script", page)) == 4  # motion and body, and the page's own two
     assert all("alert" not in script for script in seen.scripts)
     assert sum(text.count("alert(1)") for text in seen.text) >= 8  # shown as text
     card = evil._repr_html_()
@@ -289,3 +291,77 @@ def test_feet_that_hold_are_filled_in_the_film_of_a_card():
     hollow = re.findall(r'attributeName="stroke-opacity"[^>]*values="([^"]+)"', found._repr_html_())
     drawn = [each.split(";") for each in hollow]
     np.testing.assert_array_equal(drawn, np.where(np.tile(held, 2), "0", "1"))
+
+
+NODE = shutil.which("node")
+STAGE = """
+const made = [], element = id => ({
+  textContent: id === "toy-body" ? BODY : "", clientWidth: 600, clientHeight: 200, addEventListener() {},
+  getContext: () => new Proxy({}, { get: (_, name) => (...at) => made.push(at) }),
+});
+const said = element("toy-said"), sliders = Object.entries(VALUES).map(([name, value]) => ({
+  name, value: String(value), dataset: {}, addEventListener() {}, nextElementSibling: element(),
+}));
+globalThis.document = {
+  documentElement: null, getElementById: id => id === "toy-said" ? said : element(id), querySelectorAll: () => sliders,
+};
+globalThis.window = {
+  matchMedia: () => ({ matches: true }), getComputedStyle: () => ({ getPropertyValue: () => "black" }), requestAnimationFrame() {},
+};
+"""
+FLOORS = [(3, (1, 1, 1)), (5, (3, 1, 1)), (8, (2, 0.5, 1.5)), (2, (1, 0.3, 0.9))]
+
+
+def played(page, before="", after=""):
+    """What the page's own script prints."""
+    (script,) = (text for text in outline(page).scripts if "function crawl" in text)
+    done = subprocess.run([NODE, "-e", before + script + after], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.skipif(NODE is None, reason="node is not installed")
+@pytest.mark.parametrize(("n_link", "mu"), FLOORS)
+def test_the_balance_in_the_page_moves_a_chain_as_the_replay_does(n_link, mu, page):
+    lengths = np.random.default_rng(n_link).uniform(0.5, 1.5, n_link)
+    lengths /= lengths.sum()
+    body = json.dumps({"lengths": lengths.tolist(), "weights": lengths.tolist()})
+    gait = {"amplitude": 0.9, "lag": 1.1, "offset": 0}
+    call = f"const r = crawl({body}, {json.dumps(gait)}, {json.dumps(mu)}, 1e-2, 2000);"
+    print_it = "console.log(JSON.stringify([r.distance, r.work, r.turn]));"
+    distance, work, turn = json.loads(played(page, after=call + print_it))
+    lag = 1.1 * (np.arange(1, n_link) - n_link / 2)[:, None]
+    wave = Fourier(np.zeros(n_link - 1), 0.9 * np.cos(lag), 0.9 * np.sin(lag))
+    floor = Friction(mu_t=mu[0], mu_f=mu[1], mu_b=mu[2])
+    right = replay(Chain(tuple(lengths)), floor, lambda t: (wave.angles(t), wave.rates(t)), 1e-2)
+    assert distance == pytest.approx(right.distance, abs=1e-6)
+    assert work == pytest.approx(right.work, rel=1e-6)
+    assert turn == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.skipif(NODE is None, reason="node is not installed")
+def test_sliders_of_the_page_say_and_draw_what_their_wave_does(page, three_link):
+    """The ellipse with equal amplitudes a quarter apart is a wave with that lag."""
+    sliders = {"amplitude": 60, "lag": 90, "offset": 0, "mu_t": 1, "mu_f": 1, "mu_b": 1}
+    data = next(text for text in outline(page).scripts if text.startswith('{"lengths"'))
+    stage = STAGE.replace("BODY", json.dumps(data)).replace("VALUES", json.dumps(sliders))
+    said = played(page, stage, "\nconsole.log(said.textContent, made.length > 240);")
+    a, turn = np.pi / 3, np.sqrt(0.5)
+    right = evaluate(
+        Problem("wave", gait=Harmonic(1), delta=1e-3),
+        Fourier([0.0, 0.0], [[turn * a], [turn * a]], [[-turn * a], [turn * a]]),
+    )
+    distance, work = map(float, re.findall(r"[\d.]+(?= body)|(?<=work )[\d.]+", said))
+    assert distance == pytest.approx(right.distance, abs=1e-3)
+    assert work == pytest.approx(right.work, rel=1e-3)
+    assert said.strip().endswith("true")
+
+
+def test_only_chains_of_up_to_eight_links_on_their_bellies_get_sliders(page, unsolved):
+    assert "Play with it" in page
+    nine = Problem(
+        "nine", Fourier(np.zeros(8), np.full((8, 1), 0.1), np.eye(8, 1)), Chain((1 / 9,) * 9)
+    )
+    feet = Problem("feet", ellipse(0.0, 1.0, 1.0), Chain((1 / 3,) * 3, feet=1), gait=Harmonic(1))
+    for other in (nine, feet):
+        assert "Play with it" not in report_page(unsolved(other))
