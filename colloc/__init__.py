@@ -58,6 +58,7 @@ _NAMES = {
     "results.store": "load save",
     "pictures.controllers": "Servo",
     "search.evaluate": "evaluate",
+    "search.identify": "identify",
     "search.certify": "certify",
     "verification.replay": "replay",
     "verification.differential_motion": "slope_motion inertial_motion motion_from_rest",

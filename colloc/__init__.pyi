@@ -38,6 +38,7 @@ from colloc.results.solution import Solution as Solution
 from colloc.results.store import load as load, save as save
 from colloc.pictures.controllers import Servo as Servo
 from colloc.search.evaluate import evaluate as evaluate
+from colloc.search.identify import identify as identify
 from colloc.search.certify import certify as certify
 from colloc.verification.replay import replay as replay
 from colloc.verification.differential_motion import slope_motion as slope_motion

@@ -91,6 +91,7 @@ Study: name="s", axes=(Axis("mu_t", (1, 2)),), problem=lambda mu_t: PROBLEM
 certify: answer=None
 ellipse: A0=0.0, A1=1.0, B1=1.0
 evaluate: problem=PROBLEM, gait=None
+identify: problem=PROBLEM, record="none.csv"
 fitted_friction: table=[[0.1, 1, 2], [0.2, 1, 2], [0.3, 1, 2], [0.5, 1, 2], [1, 1, 2]]
 inertial_motion: **ON, froude=0.0
 load: path="none.h5"

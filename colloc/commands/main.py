@@ -33,6 +33,7 @@ SUBCOMMANDS = {
     "pareto": ("families", "trade-off (Pareto front) of two objectives, as certified gaits"),
     "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),
     "evaluate": ("solve", "evaluate a gait of your own: joint angles from a CSV file"),
+    "identify": ("solve", "friction of a floor from joint angles and the way that a robot went"),
     "verify": ("results", "check a result again by independent replay; or compare two results"),
     "report": ("results", "one self-contained web page about a result, to read or to send"),
     "animate": ("results", "the motion as GIF or MP4"),

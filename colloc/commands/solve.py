@@ -584,6 +584,17 @@ def solve(options: argparse.Namespace) -> int:
     return BAD_PROBLEM if complaints and ended else EXIT[solution.status]
 
 
+_OF_A_GAIT = (
+    cli.option(
+        str, "problem", None, "a Python file that states PROBLEM, for body, friction and limits"
+    ),
+    cli.option(str, "gait", "GAIT.csv", "times and joint angles"),
+    cli.option(float, "--period", "T", "in the file's unit of time (default: from repetition)"),
+    cli.option(int, "--harmonics", "N", "of the fit (default: as many as the samples determine)"),
+    cli.flag("--degrees", "angles are degrees where names do not say what they are"),
+)
+
+
 @cli.command(
     """\
 The file has a line for each time point: its time, then the angle of each joint. Columns are known
@@ -593,13 +604,7 @@ include the residual of the samples, with two standard deviations.
 
   colloc evaluate problems/three_link.py mine.csv                          results/mine-evaluated.h5
   colloc verify results/mine-evaluated.h5 --compare results/three_link.h5""",
-    cli.option(
-        str, "problem", None, "a Python file that states PROBLEM, for body, friction and limits"
-    ),
-    cli.option(str, "gait", "GAIT.csv", "times and joint angles"),
-    cli.option(float, "--period", "T", "in the file's unit of time (default: from repetition)"),
-    cli.option(int, "--harmonics", "N", "of the fit (default: as many as the samples determine)"),
-    cli.flag("--degrees", "angles are degrees where names do not say what they are"),
+    *_OF_A_GAIT,
     cli.output("folder or .h5 file (default: results/GAIT-evaluated.h5)"),
     cli.VERBOSE,
 )
@@ -613,3 +618,27 @@ def evaluate(options: argparse.Namespace) -> int:
     solution = evaluate_gait(problem.with_(name=name), options.gait, **settings)
     path = cli.output_path(options, Path("results") / f"{name}.h5")
     return save_and_tell(options, solution, path)
+
+
+@cli.command(
+    """\
+The file has a line for each time point: its time and the angle of each joint, as for evaluate, and
+the place of a point of the body: x, y (the centre of mass), head_x, head_y, tail_x or tail_y, in
+body lengths, or with --length in m (head_x_mm, [cm]); perhaps the direction theta, yaw or heading
+of its tail link. Axes may lie anywhere. Errors are two standard deviations.
+
+  colloc identify problems/three_link.py floor.csv --length 0.62""",
+    *_OF_A_GAIT,
+    cli.option(float, "--length", "M", "of the robot [m] (default: the problem's)", least=0),
+    cli.option(float, "--mu-forward", "MU", "the forward coefficient, measured otherwise", least=0),
+)
+def identify(options: argparse.Namespace) -> int:
+    from colloc.search.identify import identify as identify_friction
+
+    problem = read_problem_file(options.problem).problem
+    names = ("period", "harmonics", "degrees", "length")
+    with cli.status_line(options) as line:
+        line.say(f"{problem.name}: identifying friction")
+        found = identify_friction(problem, options.gait, **cli.values(options, *names))
+    cli.tell(options, found.facts(), [f"{problem.name}: {found.message}", str(found)])
+    return OK

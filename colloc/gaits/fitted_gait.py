@@ -37,7 +37,7 @@ SEVERAL = 1.1  # periods from which a record holds more than one
 _STEP = 1e-5  # relative, of differences by the period
 _HIGHEST = 64  # harmonics of a class at most
 _CHANCE = 0.05  # that noise alone seems worth more harmonics
-_COVERED = 0.97725  # standard normal distribution at two standard deviations
+COVERED = 0.97725  # standard normal distribution at two standard deviations
 _TINY = 1e-300
 
 Given = Fourier | np.ndarray | str | os.PathLike[str] | Callable[[np.ndarray], np.ndarray]
@@ -355,7 +355,7 @@ class _Samples(NamedTuple):
             residuals, used = rest, richer.shape[1]
         freedom = max(time.size - used, 1)
         u, s, v = np.linalg.svd(twice.columns(time), full_matrices=False)
-        variance = (residuals**2).sum(axis=1) / freedom * _correlation_time(residuals)
+        variance = (residuals**2).sum(axis=1) / freedom * correlation_time(residuals)
         deviation = np.sqrt(variance) + _TINY
         root = (v.T / s)[first:].T  # a row for each direction
         each = deviation[:, None] * np.eye(joints)
@@ -371,7 +371,7 @@ class _Samples(NamedTuple):
             change = -((along / s) @ v)[None, :, first:] / np.sqrt(orthogonal.sum() + _TINY)
             directions = np.concatenate([directions, change])
         series = Fourier.from_table(richer[:, first:]) if is_richer else None
-        return Uncertainty(directions, float(stdtrit(freedom, _COVERED)), series)
+        return Uncertainty(directions, float(stdtrit(freedom, COVERED)), series)
 
 
 def _autocorrelation(rows: np.ndarray) -> np.ndarray:
@@ -380,7 +380,7 @@ def _autocorrelation(rows: np.ndarray) -> np.ndarray:
     return np.fft.irfft(spectrum.sum(axis=0), 2 * n)[:n]
 
 
-def _correlation_time(residuals: np.ndarray) -> float:
+def correlation_time(residuals: np.ndarray) -> float:
     """Samples in a row that share a residual: 1 for white noise, more if a fit lacks something."""
     correlation = _autocorrelation(residuals)
     correlation /= correlation[0] + _TINY

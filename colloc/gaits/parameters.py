@@ -16,7 +16,7 @@ from colloc.mechanics.floor_contact import Foot
 from colloc.mechanics.law import Law
 from colloc.system.arguments import is_number
 
-_COEFFICIENTS = {
+COEFFICIENTS = {
     "mu_t": "friction sideways",
     "mu_f": "friction forwards",
     "mu_b": "friction backwards",
@@ -68,12 +68,12 @@ def parameters(problem: Problem) -> list[Parameter]:
     if not feet or any(foot.friction is None for foot in feet):
         for field, value in _coefficients(problem.friction):
             new = partial(_change_coefficient, problem.friction, field)
-            add(_COEFFICIENTS[field], value, "friction", new)
+            add(COEFFICIENTS[field], value, "friction", new)
     for law in dict.fromkeys(foot.friction for foot in feet if foot.friction is not None):
         which = _count_from("foot", [k for k, foot in enumerate(feet) if foot.friction == law])
         for field, value in _coefficients(law):
             new = partial(_change_friction_of_feet, feet, law, field)
-            add_of_body(f"{_COEFFICIENTS[field]} of {which}", value, "feet", new)
+            add_of_body(f"{COEFFICIENTS[field]} of {which}", value, "feet", new)
     if chain:
         _add_links(chain, problem.gait.symmetry == BILATERAL, add_of_body)
         if chain.width:
@@ -93,9 +93,7 @@ def parameters(problem: Problem) -> list[Parameter]:
 def _coefficients(law: Law) -> list[tuple[str, float]]:
     """Coefficients of a law by name; those of a law of formulas may bear the same names."""
     stated = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
-    return [
-        (field, float(stated[field])) for field in _COEFFICIENTS if is_number(stated.get(field))
-    ]
+    return [(field, float(stated[field])) for field in COEFFICIENTS if is_number(stated.get(field))]
 
 
 def _add_links(chain: Chain, mirrored: bool, add: Callable[..., None]) -> None:

@@ -24,7 +24,7 @@ _ANGLES |= dict.fromkeys(("deg", "degs", "degree", "degrees", "grad", "°"), _DE
 _WORDS = {
     "time": "t|time|timestamp|stamp|zeit|temps|tiempo|tempo|clock|elapsed|datetime|date|uptime|"
     "n?secs|nanosecs?",
-    "other": "vel.*|speeds?|rate|dot|qd|dq|omega|effort|torques?|tau|load|volt.*|temp.*|power|"
+    "other": "vel.*|speeds?|rates?|dot|qd|dq|omega|effort|torques?|tau|load|volt.*|temp.*|power|"
     "acc.*|pwm|force|currents?|err.*|imu|gyro|battery|per|nm|m[va]|rpm|moving|status|cov.*",
     "count": "index|idx|samples?|frame|step|seq|nr|no|count(er)?|id|row|unnamed|attempt",
     "angle": "positions?|pos|angles?",
@@ -36,6 +36,7 @@ _WORDS = {
     "unit not read": "revs?|revolutions|turns?|gons?|ticks?|counts",
 }
 """Words in names of columns, as regular expressions; "other" are columns that are no angles."""
+HEADINGS = {"theta", "yaw", "heading"}  # of a link, without a number
 _ROUNDED = 0.15  # share of unequal time steps from which equal steps were rounded
 _MOST = 5_000  # samples; of more, every second, third ... is taken
 _CENTRED = np.radians(20)
@@ -51,6 +52,7 @@ class Record(NamedTuple):
     taken: str  # what was read, and what was left out, in one sentence without its full stop
     centre: int  # right angle about which servos are centred [degrees]; 0 if about none
     path: np.ndarray | None  # centre of mass and tail that markers tell, x and y, (2, 2, n_time)
+    rows: np.ndarray  # of the table that were taken, (n_time,)
 
 
 class _Column(NamedTuple):
@@ -150,7 +152,9 @@ def read_record(
     centred = n_joint > 1 and np.abs(centres - right).max() < _CENTRED
     centre = int(np.degrees(right).round()) if centred else 0
     taken = "; ".join(facts)
-    return Record(time - time[0], angles, bool(in_degrees.all()), period, taken, centre, places)
+    return Record(
+        time - time[0], angles, bool(in_degrees.all()), period, taken, centre, places, rows
+    )
 
 
 def _names(columns: list[_Column], which: np.ndarray) -> str:
@@ -209,6 +213,9 @@ def _joints(
     measured = [column for column in angles if not column.last("commanded")]
     if len(angles) > n_joint <= len(measured):
         angles = measured
+    joints = [column for column in angles if not {*column.words} & HEADINGS or column.numbers]
+    if len(angles) > n_joint <= len(joints):
+        angles = joints
     sets: dict[tuple[str, ...], list[_Column]] = {}
     for column in angles:
         sets.setdefault(column.skeleton, []).append(column)

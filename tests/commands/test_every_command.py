@@ -99,6 +99,7 @@ export good.h5 --period 4 --clamp 2500 500 -> clamp of servos must be pairs of a
 export good.h5 --period 4 --scale 1 2 3 -> scale of servos is given for 3 joints of 2
 evaluate | problem.py | problem.py nope.csv | nope.py text.h5 | problem.py text.h5 | problem.py text.h5 --period x
 evaluate problem.py good.h5 -> good.h5 is no text of numbers in UTF-8: a CSV file is read here
+identify | problem.py | problem.py nope.csv | nope.py text.h5 | problem.py text.h5 | problem.py text.h5 --length 0
 robot | nope.h5 --length 1 --mass 1 --period 1 | good.h5 | good.h5 --length 1 --mass 1
 robot | good.h5 --length 0 --mass 1 --period 1 | good.h5 --length 1 --mass nan --period 1
 robot | good.h5 --length 1 --mass 1 --period -5 | good.h5 --length 1 --mass 1 --period 1 --max-torque 1 2 3

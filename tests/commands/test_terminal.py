@@ -4,6 +4,7 @@ nowhere else."""
 import re
 import sys
 
+import numpy as np
 import pytest
 
 import colloc
@@ -34,6 +35,7 @@ COMMANDS = {
     "pareto": "quick.py --points 2 --starts 1",
     "steer": "quick.py --turn 0 5 --starts 1",
     "evaluate": "quick.py quick.csv",
+    "identify": "quick.py path.csv",
     "verify": "quick.h5",
     "report": "quick.h5",
     "animate": "quick.h5 --periods 1 --seconds 0.2 --width 200",
@@ -55,6 +57,10 @@ def quick(tmp_path_factory):
     solution = colloc.solve(folder / "quick.py", starts=1, output=folder / "quick.h5")
     colloc.multistart(solution.problem, 1, archive=folder / "quick.starts.h5")
     assert run(["export", f"{folder}/quick.h5", "--period", "4", "--quiet"]) == 0
+    motion = solution.sample(t := np.arange(50) / 50)
+    rows = np.column_stack([t, *motion.angles, *motion.centre])
+    names = "t,joint_1,joint_2,x,y"
+    np.savetxt(folder / "path.csv", rows, delimiter=",", header=names, comments="")
     return folder
 
 

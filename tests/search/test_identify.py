@@ -1,0 +1,175 @@
+"""Friction from motion: what moved under known coefficients is found to, within the stated errors;
+what a motion does not tell is said."""
+
+import json
+
+import numpy as np
+import pytest
+
+import colloc
+from colloc import Chain, Coupled, Foot, Fourier, Friction, Harmonic, Problem, Robot, Wheel
+from colloc.commands.main import main
+
+GAIT = colloc.ellipse(A0=0.3, A1=1.6, B1=1.1)
+WAVE = Fourier([0.0, 0.0, 0.0], [[0.6], [0.3], [-0.3]], [[0.0], [0.5], [0.5]])
+TRUE = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
+GEARED = Coupled(Harmonic(1), gears=((1, 0), (0, 1), (-1, 1)))
+FLOOR = Problem("floor", delta=1e-3)
+
+
+@pytest.fixture(scope="module")
+def crawled():
+    return colloc.evaluate(FLOOR.with_(friction=TRUE), GAIT)
+
+
+def recorded(path, solution, seed=0, noise=2e-3, periods=2.0, per_period=100, point="", length=1.0):
+    """A record of joint angles and of places of a point, from a camera that stands somewhere."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(periods * per_period)) / per_period
+    motion = solution.sample(t)
+    angles = motion.angles + noise * rng.normal(size=motion.angles.shape)
+    if head := point == "head_":
+        ends = np.stack(solution.problem.body.outline(motion.angles))[:, -1]
+        c, s = np.cos(motion.theta), np.sin(motion.theta)
+        ends = np.stack([c * ends[0] - s * ends[1], s * ends[0] + c * ends[1]])
+    at = {"": motion.centre, "tail_": motion.tail, "head_": motion.tail + (ends if head else 0)}[
+        point
+    ]
+    place = np.exp(1j * rng.uniform(0, 6)) * (at[0] + 1j * at[1]) + 3 - 2j
+    place = length * (place + noise * (rng.normal(size=t.size) + 1j * rng.normal(size=t.size)))
+    columns = [4 * t, *angles, place.real, place.imag]
+    names = ["time_s", *(f"joint_{k + 1}" for k in range(len(angles))), f"{point}x", f"{point}y"]
+    if point == "tail_":
+        columns.append(np.degrees(motion.theta) + 30 + np.degrees(noise) * rng.normal(size=t.size))
+        names.append("yaw_deg")
+    np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=",".join(names), comments="")
+    return path
+
+
+def test_known_coefficients_lie_within_the_errors_nineteen_times_in_twenty(crawled, tmp_path):
+    off = []
+    for seed in range(12):
+        found = colloc.identify(FLOOR, recorded(tmp_path / "a.csv", crawled, seed)).coefficients
+        assert found["mu_f"] == (1.0, 0.0)
+        assert found["mu_t"][1] < 0.1
+        off.append([(found[x][0] - getattr(TRUE, x)) / found[x][1] for x in ("mu_t", "mu_b")])
+    # an error is two standard deviations, so these are about a half, and 1 is rare
+    assert (np.abs(off) < 1).mean() > 0.8
+    assert 0.25 < np.sqrt(np.mean(np.square(off))) < 0.75
+
+
+@pytest.mark.parametrize("point", ["head_", "tail_"])
+def test_any_point_of_the_body_and_its_direction_will_do_in_metres_too(crawled, tmp_path, point):
+    path = recorded(tmp_path / "a.csv", crawled, noise=1e-6, point=point, length=0.6)
+    found = colloc.identify(FLOOR, path, length=0.6)
+    assert found.problem.friction.mu_t == pytest.approx(TRUE.mu_t, rel=1e-3)
+    assert found.problem.friction.mu_b == pytest.approx(TRUE.mu_b, rel=1e-3)
+    assert found.after < 1e-4 < found.before
+    again = colloc.identify(FLOOR.with_(robot=Robot(length=0.6, mass=1, period=90)), path)
+    assert again.coefficients == found.coefficients
+    (tmp_path / "m.csv").write_text(path.read_text().replace(f"{point}x", f"{point}x_m"))
+    with pytest.raises(colloc.ProblemError, match="give the length of the body"):
+        colloc.identify(FLOOR, tmp_path / "m.csv")
+
+
+def test_markers_at_ends_and_joints_tell_angles_and_path(crawled, tmp_path):
+    motion = crawled.sample(t := np.arange(200) / 100)
+    outline = np.stack(crawled.problem.body.outline(motion.angles))
+    points = motion.tail[0] + 1j * motion.tail[1]
+    points = points + np.exp(1j * motion.theta) * (outline[0] + 1j * outline[1])
+    rows = np.column_stack([t, *np.concatenate([60 * points.real, 60 * points.imag])])
+    names = "t," + ",".join(f"{axis}_{k}" for axis in "xy" for k in range(1, 5))
+    np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header=names, comments="")
+    found = colloc.identify(FLOOR, tmp_path / "a.csv").problem.friction
+    assert found.mu_t == pytest.approx(TRUE.mu_t, rel=1e-3)
+    assert found.mu_b == pytest.approx(TRUE.mu_b, rel=1e-3)
+
+
+def test_with_inertia_the_coefficients_themselves_are_found(tmp_path):
+    true = FLOOR.with_(friction=Friction(mu_t=0.5, mu_f=0.3, mu_b=0.4), froude=0.05, delta=1e-2)
+    path = recorded(tmp_path / "a.csv", colloc.evaluate(true, GAIT), noise=1e-4, per_period=50)
+    found = colloc.identify(true.with_(friction=Friction(mu_t=0.4, mu_f=0.4, mu_b=0.4)), path)
+    for name, (value, error) in found.coefficients.items():
+        assert 0 < error < 0.02, name
+        assert abs(value - getattr(true.friction, name)) < 1.5 * error, name
+    assert not found.remarks
+
+
+def test_wheels_have_one_coefficient_of_rolling(tmp_path):
+    def wheeled(rolling):
+        body = Chain((0.25,) * 4, feet=[Wheel(k, rolling=rolling) for k in range(4)])
+        return Problem("wheels", body=body, delta=1e-3)
+
+    path = recorded(tmp_path / "a.csv", colloc.evaluate(wheeled(0.02), WAVE))
+    found = colloc.identify(wheeled(0.1), path)
+    assert list(found.coefficients) == ["mu_t", "mu_f"]
+    value, error = found.coefficients["mu_t"]
+    assert abs(value - 5.0) < 1.5 * error < 0.1
+    assert "friction=Friction(mu_t=" in found.line
+
+
+def test_what_the_motion_does_not_tell_stays_as_stated_and_is_said(tmp_path):
+    """A body that is driven tail first, on feet that hardly slip sideways, tells nothing of sliding
+    forwards."""
+
+    def standing(back):
+        each = Friction(mu_t=1.0, mu_f=0.1, mu_b=back)
+        body = Chain((0.25,) * 4, feet=[Foot(k, friction=each) for k in range(4)])
+        return Problem("standing", body=body, delta=1e-3)
+
+    path = recorded(tmp_path / "a.csv", colloc.evaluate(standing(0.05), WAVE))
+    found = colloc.identify(standing(0.08), path)
+    assert any("cannot tell mu_f from mu_t and mu_b" in each for each in found.remarks)
+    assert found.coefficients["mu_b"][1] == np.inf
+    assert found.facts()["coefficients"]["mu_b"][1] is None
+    value = {name: value for name, (value, _) in found.coefficients.items()}
+    assert value["mu_t"] / value["mu_b"] == pytest.approx(20.0, rel=0.05)
+    # and a body that hardly waves tells nothing at all
+    little = Fourier([0.0, 0.0], [[0.1], [0.05]], [[0.0], [0.1]])
+    path = recorded(tmp_path / "a.csv", colloc.evaluate(FLOOR, little), noise=5e-3)
+    found = colloc.identify(FLOOR, path)
+    for name in ("mu_t", "mu_b"):
+        assert found.coefficients[name] == (pytest.approx(1.0, abs=0.1), np.inf)
+
+
+def test_motors_may_share_joints(tmp_path):
+    geared = Problem("geared", body=Chain((0.25,) * 4), gait=GEARED, delta=1e-3)
+    motors = Fourier([0.2, 0.0], [[0.8], [0.3]], [[0.0], [0.9]])
+    motion = colloc.evaluate(geared.with_(friction=TRUE), motors).sample(t := np.arange(200) / 100)
+    names = "t,joint_1,joint_2,x,y"
+    rows = np.column_stack([t, *motors.angles(t), *motion.centre])
+    np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header=names, comments="")
+    found = colloc.identify(geared, tmp_path / "a.csv")
+    assert found.problem.friction.mu_t == pytest.approx(TRUE.mu_t, rel=0.01)
+    assert found.problem.friction.mu_b == pytest.approx(TRUE.mu_b, rel=0.01)
+
+
+def test_a_path_of_another_body_is_not_explained(crawled, tmp_path):
+    path = recorded(tmp_path / "a.csv", crawled)
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    rows[:, 3] += 0.3 * np.sin(rows[:, 0])
+    head = path.read_text().split("\n")[0]
+    np.savetxt(path, rows, "%.9g", ",", header=head, comments="")
+    assert "No coefficients lead there" in str(colloc.identify(FLOOR, path))
+
+
+def test_the_command_prints_what_to_write_into_the_problem_file(crawled, tmp_path, capsys):
+    recorded(tmp_path / "a.csv", crawled)
+    problem = tmp_path / "floor.py"
+    problem.write_text("from colloc import *\nPROBLEM = Problem('floor', delta=1e-3)\n")
+    assert main(["identify", str(problem), str(tmp_path / "a.csv")]) == 0
+    said = capsys.readouterr().out
+    found = colloc.identify(FLOOR, tmp_path / "a.csv")
+    assert str(found) in said
+    assert eval(found.line.partition("=")[2], {"Friction": Friction}) == found.problem.friction
+    assert main(["identify", str(problem), str(tmp_path / "a.csv"), "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["coefficients"]["mu_t"] == list(found.coefficients["mu_t"])
+
+
+def test_a_record_without_a_path_is_refused(tmp_path):
+    t = np.arange(60) / 60
+    rows = np.column_stack([t, *GAIT.angles(t)])
+    np.savetxt(tmp_path / "a.csv", rows, header="t,joint_1,joint_2", delimiter=",", comments="")
+    with pytest.raises(colloc.ProblemError, match="holds no path of the body"):
+        colloc.identify(FLOOR, tmp_path / "a.csv")
