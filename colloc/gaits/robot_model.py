@@ -21,6 +21,7 @@ from colloc.system.errors import ProblemError
 _SMALL = 1e-3  # sine of an angle, or part of the length, that counts as none
 _OFF = 0.05  # distance of a link's mass from its middle that is spoken of, over its length
 _ROLLS = 0.5  # friction along over that across, below which a contact is a wheel
+_FOOT = "sprung slide"  # kind of joint of what presses on the floor
 _LINE = 16  # Gauss points of a pad in MJCF
 _RARE = "include replicate attach frame *[@xyaxes] *[@zaxis] *[@axisangle] *[@eulerseq]"
 
@@ -57,7 +58,6 @@ class _Part:
     moment: Any = 0.0  # sum of mass times place
     solids: list[tuple[np.ndarray, np.ndarray, int]] = field(default_factory=list)
     """Middle, half axes as columns, and the norm that tells how far they reach: 1 of a box."""
-    feet: list[np.ndarray] = field(default_factory=list)
 
     def weigh(self, mass: np.ndarray, place: np.ndarray) -> None:
         self.mass, self.moment = self.mass + float(mass[0]), self.moment + mass * place
@@ -67,7 +67,7 @@ class _Part:
         if kind == "box":
             self.solids.append((place, turn * size, 1))
         elif kind in ("sphere", "cylinder", "capsule"):
-            r, h = (*size, 0.0)[:2]
+            r, h = (*size, 0.0, 0.0)[:2]
             z = {"sphere": r, "cylinder": h}.get(kind, r + h)
             self.solids.append((place, turn * [r, r, z], 2))
 
@@ -85,7 +85,7 @@ def read_model(path: Path) -> Model:
         if root.tag not in ("robot", "mujoco"):
             raise ProblemError(f"<{root.tag}> is neither a URDF (<robot>) nor an MJCF (<mujoco>).")
         return _chain(_urdf(root) if root.tag == "robot" else _mjcf(root))
-    except ProblemError as error:
+    except (ProblemError, ValueError) as error:
         raise ProblemError(f"{path}: {error}") from None
 
 
@@ -135,7 +135,8 @@ def _urdf(root: Element) -> list[_Part]:
                     size = np.append(r, 0.5 * length)
                 part.solid(shape.tag, size, *placed(each, frame, of))
                 if use == "collision" and kinds[1] == {"sphere"} < kinds[0] | {"sphere"}:
-                    part.feet.append(part.solids[-1][0])  # a sphere under something else
+                    middle = placed(each, frame, of)[0]  # of a sphere under something else
+                    parts.append(_Part("", part, "", _FOOT, middle, np.eye(3)[2]))
         for joint, child in carried[name]:
             kind, of = joint.get("type", ""), f'joint "{joint.get("name")}"'
             where, axes = own = placed(joint, frame, of)
@@ -196,7 +197,7 @@ def _mjcf(root: Element) -> list[_Part]:
         part = part or _Part(body.get("name", ""))
         for joint in joints:
             kind = joint.get("type", "hinge")
-            kind = "foot" if kind == "slide" and joint.get("stiffness") else kind
+            kind = _FOOT if kind == "slide" and joint.get("stiffness") else kind
             part = _Part(body.get("name", ""), part, joint.get("name", ""), kind, turn=turn)
             part.place = place + turn @ _row(joint, "pos", "0 0 0", of)
             part.axis = turn @ _row(joint, "axis", "0 0 1", of)
@@ -243,7 +244,7 @@ def _chain(parts: list[_Part]) -> Model:
     for part in parts[1:]:
         cos = abs(float(part.axis @ up) / np.linalg.norm(part.axis))
         what, cure = f'joint "{part.joint}"', "fix it in the file if the robot can hold it"
-        if part.kind == "foot" or (part in known and not known[part] and cos < _SMALL):
+        if (part.kind == _FOOT and not carried[part]) or (known.get(part) == 0 and cos < _SMALL):
             stand.append(part)
         elif part not in known:
             raise ProblemError(f"{what} is {part.kind}: a chain has hinges alone; {cure}.")
@@ -271,9 +272,9 @@ def _chain(parts: list[_Part]) -> Model:
     if any(x in ends[0] for x in ("head", "front")) or any(x in ends[1] for x in ("tail", "rear")):
         links.reverse()
     joints = [b if b.parent is a else a for a, b in pairwise(links)]
-    sides = [1 if b.parent is a else -1 for a, b in pairwise(links)]
     signs = [
-        side * math.copysign(1, part.axis @ up) for part, side in zip(joints, sides, strict=True)
+        math.copysign(1, x.axis @ up) * (1 if x is b else -1)
+        for x, b in zip(joints, links[1:], strict=True)
     ]
     places = np.array([part.place for part in joints]) @ (np.eye(3) - np.outer(up, up))
     span = float(np.linalg.norm(places[-1] - places[0]))
@@ -320,24 +321,16 @@ def _chain(parts: list[_Part]) -> Model:
     feet, nodes = list[str](), np.polynomial.legendre.leggauss(_LINE)[0]
     for k, part in enumerate(links):
         rows = []
-        for x in (
-            *(y for y in stand if y.parent is part),
-            *(_Part("", place=y) for y in part.feet),
-        ):
+        for x in (y for y in stand if y.parent is part):
             kind, (along, across) = "Foot", x.friction
             offset = (x.place - places[0]) @ left / lengths.sum()
             more = f", offset={offset:.6g}" if abs(offset) > 1e-6 else ""
-            if x.kind == "foot" and along < _ROLLS * across:
-                kind, more, rolls = (
-                    "Wheel",
-                    f"{more}, rolling={along:g}, sideways={across:g}",
-                    x.turn[:, 0],
-                )
-            elif x in wheels:
-                kind, more, rolls = "Wheel", f"{more}, sideways={{mu:g}}", np.cross(x.axis, up)
-            if kind == "Wheel":
+            if x in wheels or along < _ROLLS * across:
+                kind, rolls = "Wheel", np.cross(x.axis, up) if x in wheels else x.turn[:, 0]
                 angle = math.remainder(math.atan2(rolls @ left, rolls @ ahead), math.pi)
                 more += f", angle={angle:.6g}" if abs(angle) > _SMALL else ""
+                own = f"rolling={along:g}, sideways={across:g}"
+                more += ", sideways={mu:g}" if x in wheels else f", {own}"
             place = (x.place @ ahead - at[k]) / lengths[k]
             rows.append((round(float(place), 6) + 0.0, kind, more))
         rows.sort()
