@@ -41,6 +41,7 @@ _NAMES = {
     "smooth.crawler_body": "CrawlerBody",
     "smooth.prescribed_body": "Concertina Wave",
     "mechanics.friction": "Friction",
+    "mechanics.axle": "Axle",
     "laws.resistance": "Elliptic PowerLaw Viscous",
     "laws.own_law": "OwnLaw",
     "laws.fitted_friction": "fitted_friction FittedFriction",

@@ -14,6 +14,7 @@ from colloc.smooth.modal_body import ModalBody as ModalBody
 from colloc.smooth.prescribed_body import Concertina as Concertina
 from colloc.smooth.crawler_body import CrawlerBody as CrawlerBody
 from colloc.smooth.prescribed_body import Wave as Wave
+from colloc.mechanics.axle import Axle as Axle
 from colloc.mechanics.friction import Friction as Friction
 from colloc.laws.resistance import Elliptic as Elliptic
 from colloc.laws.resistance import Viscous as Viscous

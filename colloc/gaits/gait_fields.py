@@ -20,6 +20,7 @@ from colloc.gaits.robot import Robot
 from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.resistance import Elliptic, PowerLaw, Viscous
+from colloc.mechanics.axle import Axle
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import FeetLaw, Foot
 from colloc.mechanics.friction import Friction
@@ -38,7 +39,7 @@ KIND = "kind"
 GAITS: list[type] = [Fourier, Combination, Corners, Phases, SerpenoidSeries]
 CLASSES: list[type] = [Harmonic, BSpline, Basis, Coupled, Polygon, Prescribed, Serpenoid]
 BODIES: list[type] = [Chain, ModalBody, CrawlerBody, Concertina, Wave]
-LAWS: list[type] = [Friction, Elliptic, Viscous, PowerLaw, OwnLaw]
+LAWS: list[type] = [Friction, Elliptic, Axle, Viscous, PowerLaw, OwnLaw]
 MOTIONS: list[type] = []
 """`colloc.gaits.regime.Regime` of one's own."""
 PARTS: list[type] = [Foot, FeetLaw]

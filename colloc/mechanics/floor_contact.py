@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from colloc.mechanics.axle import Axle
 from colloc.mechanics.friction import Friction, LinkForce, LinkVelocity, line_integrals
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
@@ -113,6 +114,7 @@ class Foot:
         else "foot"."""
         own = self.friction
         rolls = isinstance(own, Friction) and own.mu_f == own.mu_b < own.mu_t
+        rolls = rolls or (isinstance(own, Axle) and own.rolling < own.sideways)
         return PAD if self.extent else WHEEL if rolls else FOOT
 
     @property
@@ -151,9 +153,15 @@ def Wheel(
     rolling: float = 0.02,
     sideways: float = 1.0,
     angle: float = 0.0,
+    axle: bool = False,
     **foot: Any,
 ) -> Foot:
     """Return a passive wheel: a foot that slides easily along its rolling direction only.
+
+    A wheel that turns freely on its axle resists rolling and slipping sideways regardless of each
+    other: ``axle=True``, the law `Axle`. By default its friction is Coulomb's, `Friction`, of one
+    size whichever way it slides: that of a skate, a scale or a locked wheel, which hold less and
+    less sideways the faster they slide along.
 
     Parameters
     ----------
@@ -163,6 +171,8 @@ def Wheel(
         Friction coefficients along the rolling direction, either way, and across it.
     angle : float
         Rolling direction, to the left of the link's [rad].
+    axle : bool
+        Whether it turns on an axle: `Axle`, else `Friction`.
     **foot
         Weight and offset, as for a `Foot`.
 
@@ -175,6 +185,8 @@ def Wheel(
     >>> from colloc import Wheel
     >>> Wheel(0).friction.label
     'friction (1, 0.02, 0.02)'
+    >>> Wheel(0, axle=True).friction.label
+    'axle (0.02, 1)'
     """
     if not (is_number(rolling) and is_number(sideways) and min(rolling, sideways) > 0):
         raise ProblemError(
@@ -186,7 +198,9 @@ def Wheel(
             "the friction of a wheel is stated by rolling and sideways; for another law of its own "
             "take Foot(link, place, friction=...)."
         )
-    friction = Friction(mu_t=sideways, mu_f=rolling, mu_b=rolling)
+    friction: Law = Friction(mu_t=sideways, mu_f=rolling, mu_b=rolling)
+    if axle:
+        friction = Axle(rolling=rolling, sideways=sideways)
     return Foot(link, place, friction=friction, angle=angle, **foot)
 
 
@@ -537,10 +551,19 @@ class FloorContact:
     def kernel_numbers(self, friction: Law) -> tuple[float, ...]:
         """Contacts and laws for the compiled kernel; empty where a law is not in closed form."""
         law = self.law(friction)
-        numbers = [each.kernel_numbers[:5] for each in self.laws(law)]
+        numbers = [each.kernel_numbers for each in self.laws(law)]
         if not all(numbers):
             return ()
-        first = np.searchsorted(self.links, np.arange(len(self.scatter) + 1))
-        head = len(self.scatter), len(self.parts), law.largest, float(law.associated), *first
         places = self.along, self.offset, self.cos, self.sin, self.length, self.pressure
-        return (*head, *np.hstack([*places, numbers]).ravel())
+        rows, links = [], []
+        for link, weight, place, own in zip(
+            self.links, self.weight[:, 0], np.hstack(places), numbers, strict=True
+        ):
+            rows.append((*place, *own[:5]))
+            if own[5:]:  # of an axle along, as of a foot at its middle that is turned to the left
+                a, h, cos, sin, *_ = place
+                rows.append((a, h, -sin, cos, 0.0, weight, *own[5:]))
+            links += [link] * (len(rows) - len(links))
+        first = np.searchsorted(links, np.arange(len(self.scatter) + 1))
+        head = len(self.scatter), len(rows), law.largest, float(law.associated), *first
+        return (*head, *np.ravel(rows))

@@ -119,9 +119,9 @@ class Friction(Coefficients):
 
     @property
     def kernel_numbers(self) -> tuple[float, ...]:
-        """Coefficients, stretches forwards and backwards, and whether there is a potential."""
+        """Coefficients, and stretches forwards and backwards."""
         stretches = [float(self.stretch(np.array(side))) for side in (1.0, -1.0)]
-        return self.mu_t, self.mu_f, self.mu_b, *stretches, float(self.associated)
+        return self.mu_t, self.mu_f, self.mu_b, *stretches
 
     @property
     def label(self) -> str:

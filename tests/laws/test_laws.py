@@ -5,7 +5,17 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from colloc import Chain, Elliptic, Friction, ModalBody, OwnLaw, PowerLaw, Viscous, solve_balance
+from colloc import (
+    Axle,
+    Chain,
+    Elliptic,
+    Friction,
+    ModalBody,
+    OwnLaw,
+    PowerLaw,
+    Viscous,
+    solve_balance,
+)
 from colloc.gaits.gait_fields import LAWS, fields, part_from
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.fixed_point import motion_and_derivatives
@@ -22,6 +32,7 @@ OWN = OwnLaw(f"-where(vs > 0, 1, 1.5)*vs{WEAKER}", f"-2*vn{WEAKER}")
 EVERY = [
     Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5),
     Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.5),
+    Axle(rolling=0.2, sideways=1.5),
     Viscous(normal=1.8, tangential=1.0),
     PowerLaw(0.4, mu_t=2.0, mu_f=1.0, mu_b=1.5),
     OWN,
@@ -29,6 +40,7 @@ EVERY = [
 ASSOCIATED = [
     Friction(),
     Elliptic(mu_t=0.3, mu_f=1.0, mu_b=4.0),
+    Axle(rolling=0.2, sideways=1.5),
     Viscous(normal=1.8, tangential=1.0),
     PowerLaw(0.4, 1.5, 1.5, 1.5),
 ]

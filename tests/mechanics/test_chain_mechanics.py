@@ -7,6 +7,7 @@ from shared.instants import random_instants, random_loads
 from shared.points import wrench
 
 from colloc import (
+    Axle,
     Chain,
     Elliptic,
     Foot,
@@ -25,13 +26,14 @@ from colloc.mechanics.native_kernel import native_kernel
 from tests.shared.without_kernel import numpy_instead
 
 LENGTHS, SKEW = (0.3, 0.45, 0.25), Friction(mu_t=0.5, mu_f=1, mu_b=2)
-ELLIPTIC = Elliptic(mu_t=2, mu_f=1, mu_b=1.5)
+ELLIPTIC, AXLE = Elliptic(mu_t=2, mu_f=1, mu_b=1.5), Axle(rolling=0.3, sideways=1.5)
 PAIR = (Foot(0, 0.2), Foot(1, 0.3, offset=0.05), Foot(1, 0.3, offset=-0.05), Foot(2, 1.0))
 STANDS = {
     "middles": 1,
     "three": 3,
     "offset": PAIR,
     "wheels": tuple(Wheel(link, 0.4, rolling=0.1) for link in range(3)),
+    "axles": (Wheel(0, 0.4, axle=True), Foot(1, friction=AXLE), Pad(2, 0.1, 0.6, friction=AXLE)),
     "own laws": (Foot(0), Wheel(1, 0.7, rolling=0.2), Foot(2, 0.1, friction=ELLIPTIC)),
     "pads": (Pad(0, 0.1, 0.6), Pad(1, 0.2, 0.5, offset=0.05), Pad(1, 0.2, 0.5, offset=-0.05), Pad(2)),
     "own pads": (Pad(0, 0.1, 0.6, friction=ELLIPTIC), Pad(1), Pad(2, 0.4, 0.5, friction=SKEW)),
@@ -51,10 +53,10 @@ BODIES = {
     ),
 }  # fmt: skip
 DRY = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), ELLIPTIC]
-LAWS = [*DRY, Viscous(), PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed")]
+LAWS = [*DRY, Viscous(), PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed"), AXLE]
 each_body = pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 each_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.label)
-each_dry_law = pytest.mark.parametrize("law", DRY, ids=lambda law: law.label)
+each_dry_law = pytest.mark.parametrize("law", [*DRY, AXLE], ids=lambda law: law.label)
 
 
 def rows(motion):
