@@ -2,7 +2,8 @@
 across them.
 
 The wheels roll at a fiftieth of the friction that they have sideways. As that ratio falls the
-motion tends to the kinematics of wheels that do not slip at all (tests/mechanics/test_feet.py).
+motion tends to the kinematics of wheels that do not slip at all
+(tests/mechanics/test_floor_contact.py).
 """
 
 from colloc import Chain, Harmonic, Problem, Wheel

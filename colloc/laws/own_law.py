@@ -19,6 +19,8 @@ _DIRECTIONS, _SPEEDS, _DELTAS = 48, np.geomspace(1e-4, 1e2, 13), (1e-6, 1e-2)
 _STEP, _JUMP = 1e-9, 1e-6
 """Distance in delta, and change of the force over the largest, that tell a jump from a slope of
 1/delta."""
+_NEARLY, _STEEP = 1e-3, 0.5
+"""A small part of the speed, and more than that of the force it has alone."""
 _RTOL, _LEAST = 1e-10, 1e-12
 _ANGLE = np.linspace(0, 2 * np.pi, 721)[None]
 _CIRCLE, _DRY = (np.cos(_ANGLE), np.sin(_ANGLE)), np.array([[1e-9]])  # unit speed, and its delta
@@ -118,6 +120,18 @@ class OwnLaw:
                 raise ProblemError(
                     f"friction: the force jumps where {name} changes its sign; let it vanish or "
                     f"agree there."
+                )
+        # flat but for a step in one velocity: Newton's steps run off to 1e154
+        one, nearly = np.ones((1, 1)), np.array([[_NEARLY]])
+        for name, k, alone, beside in (
+            ("vs", 0, self.density(one, nearly, _DRY), self.density(nearly, one, _DRY)),
+            ("vn", 1, self.density(nearly, one, _DRY), self.density(one, nearly, _DRY)),
+        ):
+            if abs(beside[k]) > _STEEP * abs(alone[k]):
+                raise ProblemError(
+                    f"friction: the force by {name} is dry regardless of the other velocity, which "
+                    f"no formula is solved for; divide by speed, or state a wheel's friction as "
+                    f"Axle(rolling=..., sideways=...)."
                 )
 
     @property

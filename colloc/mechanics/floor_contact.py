@@ -555,7 +555,7 @@ class FloorContact:
         if not all(numbers):
             return ()
         places = self.along, self.offset, self.cos, self.sin, self.length, self.pressure
-        rows, links = [], []
+        rows, links = list[tuple[float, ...]](), list[int]()
         for link, weight, place, own in zip(
             self.links, self.weight[:, 0], np.hstack(places), numbers, strict=True
         ):

@@ -220,7 +220,7 @@ class Solution:
         ------
         ProblemError
             Unless a chain crawls slowly on the level, under a law whose dry balance minimises the
-            dissipation: isotropic friction or `Elliptic`.
+            dissipation: isotropic friction, `Elliptic` or `Axle`.
         """
         p = self.problem
         if not p.regime.slow_on_level:

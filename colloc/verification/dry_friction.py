@@ -113,7 +113,7 @@ def dry_balance(body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarra
     if not (law.associated and rate_independent(law)):
         raise ProblemError(
             f"{law.label} has no bounds for delta = 0: its balance is not the least of a "
-            f"dissipation. Equal coefficients and the elliptic law have them."
+            f"dissipation. Equal coefficients, the elliptic law and axles have them."
         )
     # in units of the largest rate; velocities y of the centre of mass, beyond those of the tail, z
     rates = rates / np.where(largest > 0, largest, 1.0)

@@ -93,8 +93,8 @@ def test_the_secant_of_a_power_law_is_no_less_than_its_slope(power):
 
 def test_the_secant_of_formulas_that_are_dry_in_each_direction_does_not_vanish():
     """Far from both axes the slopes do, and fixed-point steps ran off."""
-    law = OwnLaw("-0.3*vs/sqrt(vs**2 + delta**2)", "-vn/sqrt(vn**2 + delta**2)")
-    vs, vn = np.array([[1e-4, 1e-3, 0.3, 2.0]]), np.array([[0.5, 1e-4, 0.2, 1e-3]])
+    law = OwnLaw("-0.3*vs/sqrt(vs**2 + 1e-4)", "-vn/sqrt(vn**2 + 1e-4)")
+    vs, vn = np.array([[1e-2, 1e-1, 3.0, 20.0]]), np.array([[5.0, 1e-2, 2.0, 1e-1]])
     secant, force = law.density_secant(vs, vn, 1e-4), law.density(vs, vn, 1e-4)
     for k, v in enumerate((vs, vn)):
         assert (secant[k][k] * v > -0.7 * force[k]).all()
