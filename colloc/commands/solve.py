@@ -636,7 +636,7 @@ def identify(options: argparse.Namespace) -> int:
     from colloc.search.identify import identify as identify_friction
 
     problem = read_problem_file(options.problem).problem
-    names = ("period", "harmonics", "degrees", "length")
+    names = ("period", "harmonics", "degrees", "length", "mu_forward")
     with cli.status_line(options) as line:
         line.say(f"{problem.name}: identifying friction")
         found = identify_friction(problem, options.gait, **cli.values(options, *names))

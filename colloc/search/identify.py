@@ -95,6 +95,7 @@ def identify(
     record: str | os.PathLike[str],
     *,
     length: float | None = None,
+    mu_forward: float | None = None,
     period: float | None = None,
     harmonics: int | None = None,
     degrees: bool = False,
@@ -116,6 +117,9 @@ def identify(
     length : float, optional
         Of the body [m], if places are in m or, by their names, cm or mm; by default that of the
         problem's robot. Without any they are in body lengths.
+    mu_forward : float, optional
+        The forward coefficient as measured otherwise, where motion tells ratios alone; by default
+        the stated one.
     period, harmonics, degrees
         See `colloc.evaluate`.
 
@@ -163,6 +167,13 @@ def identify(
         places = read.path[:, 0] + 1j * read.path[:, 1]
         way = _Way(["centre", "tail"], places, [], np.empty((0, read.time.size)))
     fit = _Fit(problem.without_robot, way, fitted.gait, read.time / fitted.period)
+    if mu_forward is not None:
+        check_finite(positive=True, mu_forward=mu_forward)
+        if not fit.only_ratios:
+            raise ProblemError(
+                "with inertia the motion tells all coefficients: leave mu_forward out."
+            )
+        fit.stated = fit.stated * (mu_forward / fit.stated[fit.forward])
     x = np.zeros(len(fit.free))
     before = fit.rms(x)
     for _ in range(2):  # then with the noise of places and of headings

@@ -162,9 +162,14 @@ def test_the_command_prints_what_to_write_into_the_problem_file(crawled, tmp_pat
     found = colloc.identify(FLOOR, tmp_path / "a.csv")
     assert str(found) in said
     assert eval(found.line.partition("=")[2], {"Friction": Friction}) == found.problem.friction
-    assert main(["identify", str(problem), str(tmp_path / "a.csv"), "--json"]) == 0
+    words = ["identify", str(problem), str(tmp_path / "a.csv"), "--json", "--mu-forward", "0.3"]
+    assert main(words) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert facts["coefficients"]["mu_t"] == list(found.coefficients["mu_t"])
+    scaled = {name: 0.3 * np.array(each) for name, each in found.coefficients.items()}
+    for name, each in facts["coefficients"].items():
+        assert each == pytest.approx(scaled[name], rel=1e-3)
+    with pytest.raises(colloc.ProblemError, match="leave mu_forward out"):
+        colloc.identify(FLOOR.with_(froude=0.05), tmp_path / "a.csv", mu_forward=0.3)
 
 
 def test_a_record_without_a_path_is_refused(tmp_path):
