@@ -144,7 +144,7 @@ def _check_array(name: str, values: np.ndarray, rows: int, n_time: int | None = 
 
 def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
     """The tolerance, or what rounding leaves of the forces where that is more, ``(n_time,)``."""
-    rounding = moving.body.contact.rounding
+    rounding = moving.body.contact.rounding(moving.friction)
     if not rounding:
         return tolerance
     speed = np.maximum(np.abs(moving.rates).max(axis=0), np.finfo(float).tiny)

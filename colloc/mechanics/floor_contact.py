@@ -415,10 +415,6 @@ class FloorContact:
         middle = len(lengths) // 2
         # links that may stick, the middle one first: initial guesses of a hard balance
         self.rests = tuple(sorted(set(self.links), key=lambda link: (link != middle, link)))
-        # Two feet may stick on links that turn, where rotation cancels: then each speed is known to
-        # some units of rounding of the largest, and its friction changes within delta.
-        short = any(part.extent < 1 for part in parts)
-        self.rounding = 16 * float(np.finfo(float).eps) if short else 0.0
         self._groups: dict[Law, list[Group]] = {}
 
     @property
@@ -441,6 +437,13 @@ class FloorContact:
     def laws(self, friction: Law) -> tuple[Law, ...]:
         law = self.law(friction)
         return law.laws if isinstance(law, FeetLaw) else (law,) * len(self.parts)
+
+    def rounding(self, friction: Law) -> float:
+        """What a speed is known to, over the largest: two feet, or two directions of axles, may
+        stick on links that turn, where rotation cancels; friction changes within delta."""
+        short = any(part.extent < 1 for part in self.parts)
+        short = short or any(isinstance(law, Axle) for law in self.laws(friction))
+        return 16 * float(np.finfo(float).eps) if short else 0.0
 
     def groups(self, friction: Law) -> list[Group]:
         if friction not in self._groups:
