@@ -238,11 +238,11 @@ def _chain(parts: list[_Part]) -> Model:
     if not known:
         raise ProblemError("no joint of it turns: a chain has hinges between its links.")
     first = max(known, key=lambda part: known[part])
-    up = first.axis / np.linalg.norm(first.axis)
+    up = first.axis / (float(np.linalg.norm(first.axis)) or 1.0)
     up = -up if up[2] < -_SMALL else up
     stand = []
     for part in parts[1:]:
-        cos = abs(float(part.axis @ up) / np.linalg.norm(part.axis))
+        cos = abs(float(part.axis @ up)) / (float(np.linalg.norm(part.axis)) or 1.0)
         what, cure = f'joint "{part.joint}"', "fix it in the file if the robot can hold it"
         if (part.kind == _FOOT and not carried[part]) or (known.get(part) == 0 and cos < _SMALL):
             stand.append(part)

@@ -207,6 +207,7 @@ def test_an_mjcf_has_classes_degrees_and_capsules(tmp_path, capsys):
         ((link("leg"), joint("hip", "mid", "leg", "0 0 0")), ('link "mid" carries', "j2, hip", "no branches")),
         ((link("leg"), joint("slot", "head", "leg", "0.1 0 0", kind="prismatic")), ('"slot" is prismatic', "fix it")),
         ((link("leg"), joint("lift", "head", "leg", "0.1 0 0", "0 1 0")), ('"lift" is 90 degrees off', '"j1"', "fix it")),
+        ((link("leg"), joint("none", "head", "leg", "0.1 0 0", "0 0 0")), ('"none" is 90 degrees off',)),
         ((link("leg"), joint("side", "head", "leg", "0 0.1 0")), ("on a line", "origins")),
         ((link("leg"), joint("knee", "head", "leg", "0.1 0 0")), ('where link "leg" ends', "box")),
         ((joint("knee", "head", "leg", "0.1 0 0"),), ('"knee" names a link', "not there")),
