@@ -468,7 +468,7 @@ def _elliptic(law: Law) -> Law:
         return law
     one, none = np.ones((1, 1)), np.zeros((1, 1))
     ahead, back, aside = (
-        max(float(np.hypot(*(force[0, 0] for force in law.density(*way, none)))), _LEAST)
+        max(float(np.hypot(*(force[0, 0] for force in law.density(*way, 1e-12 * one)))), _LEAST)
         for way in ((one, none), (-one, none), (none, one))
     )
     along = float(np.sqrt(ahead * back))
