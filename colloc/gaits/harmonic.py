@@ -116,9 +116,9 @@ class Fourier(GaitFunction):
 
     def resize(self, n_harmonic: int) -> Fourier:
         """The gait with harmonics added (zero) or cut."""
-        zero = ((0, 0), (0, max(0, n_harmonic - self.n_harmonic)))
-        cos, sin = (np.pad(part[:, :n_harmonic], zero) for part in (self.cos, self.sin))
-        return Fourier(self.mean, cos, sin)
+        waves, both = np.zeros((2, self.n_joint, n_harmonic)), min(n_harmonic, self.n_harmonic)
+        waves[..., :both] = self.cos[:, :both], self.sin[:, :both]
+        return Fourier(self.mean, *waves)
 
 
 def ellipse(A0: float, A1: float, B1: float) -> Fourier:

@@ -248,7 +248,7 @@ class Chain(Body):
         """Contact forces at a tail velocity, ``(n_force, n_time)`` (`FloorContact.force_names`)."""
         return self.contact.forces(friction, self.velocity(self.posture(angles), rates, z), delta)
 
-    @property
+    @cached_property
     def symmetric(self) -> bool:
         """Whether lengths, weights, masses and feet are the same from both ends."""
         parts = self.lengths, self.weights, self.masses, self.inertias

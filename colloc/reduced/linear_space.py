@@ -75,7 +75,8 @@ class LinearSpace(SearchSpace):
         if not self._gaits.linear:
             slopes = self._gaits.coefficient_slopes(own, self._matrix.shape[1] // 2)
             on_shape = on_shape @ np.vstack([np.eye(own.size), slopes])
-        return np.pad(on_shape, ((0, 0), (0, self._n_static)))
+        none = np.zeros((len(on_shape), self._n_static))
+        return np.concatenate([on_shape, none], axis=1) if self._n_static else on_shape
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         return np.append(self.shape(v), v[self.n - self._n_static :])

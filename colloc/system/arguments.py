@@ -28,15 +28,14 @@ def named_arguments(cls: type[T]) -> type[T]:
 
     Positional ones among `by_name`, if the class has it, cause an `OrderWarning` if they differ.
     """
-    init, owner = cls.__init__, cls.__name__
+    init, owner, ordered = cls.__init__, cls.__name__, getattr(cls, "by_name", ())
 
     @functools.wraps(init)
     def init_checked(self: T, *values: Any, **named: Any) -> None:
         stated = _bind(owner, init, (self, *values), named)
         by_place = list(stated)[1 : len(values) + 1]
         del stated["self"]
-        scalars = {x: kinds for x, kinds in _types(init).items() if set(kinds) <= _SCALARS}
-        plain = dict(stated)
+        scalars, plain = _scalars(init), dict(stated)
         for name, kinds in scalars.items():
             for kind in (float, int, bool):
                 if kind in kinds and name in stated and _fits(stated[name], kind):
@@ -50,7 +49,7 @@ def named_arguments(cls: type[T]) -> type[T]:
             _check_types(scalars, stated)
             raise
         _check_types(scalars, stated)  # last: the class knows better what is wrong
-        order = {name: getattr(self, name) for name in getattr(cls, "by_name", ())}
+        order = {name: getattr(self, name) for name in ordered}
         if len(set(order.values())) > 1 and order.keys() & by_place:
             read = ", ".join(f"{name}={value:g}" for name, value in order.items())
             warnings.warn(
@@ -76,11 +75,11 @@ def checked_arguments(function: Function) -> Function:
 
 
 def _bind(owner: str, function: Callable[..., Any], values: Any, named: Any) -> dict[str, Any]:
-    parameters = _signature(function).parameters
-    known = [name for name in parameters if name != "self"]
     try:
         return _signature(function).bind(*values, **named).arguments
     except TypeError as error:
+        parameters = _signature(function).parameters
+        known = [name for name in parameters if name != "self"]
         unknown = next((name for name in named if name not in known), "")
         if not unknown or any(each.kind is each.VAR_KEYWORD for each in parameters.values()):
             raise ProblemError(f"{owner}: {error}.") from None
@@ -105,6 +104,11 @@ def _types(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
     return types
 
 
+@functools.cache
+def _scalars(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
+    return {name: kinds for name, kinds in _types(function).items() if set(kinds) <= _SCALARS}
+
+
 def _alternatives(kind: Any) -> tuple[Any, ...]:
     if get_origin(kind) in (Union, UnionType):
         return get_args(kind)
@@ -113,8 +117,9 @@ def _alternatives(kind: Any) -> tuple[Any, ...]:
 
 def _check_types(types: Mapping[str, tuple[Any, ...]], stated: Mapping[str, Any]) -> None:
     for name, value in stated.items():
-        allowed = types.get(name, (Any,))
-        if not any(_fits(value, kind) for kind in allowed):
+        if (allowed := types.get(name)) is not None and not any(
+            _fits(value, kind) for kind in allowed
+        ):
             words = _or(list(dict.fromkeys(map(_words, allowed))))
             raise ProblemError(f"{name} must be {words}, not {shown(value)}.")
 
