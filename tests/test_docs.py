@@ -108,7 +108,7 @@ def test_the_summary_quoted_in_the_tutorial_is_what_a_solve_says(three_link, sol
             for mine, theirs in zip(numbers(line), numbers(same), strict=True):
                 assert mine == pytest.approx(theirs, rel=1e-3, abs=1e-3)
             checked += 1
-    assert checked == 6
+    assert checked == 7
 
 
 def test_messages_quoted_in_troubleshooting_are_the_programs_own():
