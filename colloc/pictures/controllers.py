@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from colloc.system.arguments import named_arguments, shown
+from colloc.system.arguments import is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
 
 _PER_DEGREE, _RANGE = 2000 / 180, (500.0, 2500.0)  # of common servos [microseconds]
@@ -54,7 +54,7 @@ class Servo:
     clamp: Sequence[Any] | None = None
 
     def __post_init__(self) -> None:
-        if self.clamp is None and np.array_equal(self.scale, _PER_DEGREE):
+        if self.clamp is None and is_number(self.scale) and self.scale == _PER_DEGREE:
             object.__setattr__(self, "clamp", _RANGE)
         needs: dict[str, tuple[str, Callable[[np.ndarray], Any]]] = {
             "neutral": ("numbers", np.isfinite),
