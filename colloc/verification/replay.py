@@ -113,7 +113,9 @@ def increments(panels: Panels, rule: np.ndarray = WHOLE) -> tuple[np.ndarray, ..
 
 def _integrals(rule: np.ndarray, h: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, ...]:
     """`increments` from rates ``(3 + k, ..., n, m)`` at m instants."""
-    omega, centre, others, b = rates[0].real, rates[1], rates[2:].real, rule[-1]
+    # contiguous: NumPy 2.0 rounds products with strided complex numbers now one way, now another
+    centre = np.ascontiguousarray(rates[1])
+    omega, others, b = rates[0].real, rates[2:].real, rule[-1]
     turn = np.exp(1j * h[:, None] * (omega @ rule.T))
     return h * (omega @ b), h * ((turn * centre) @ b), *(h * (other @ b) for other in others)
 
