@@ -20,7 +20,6 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import Reference, read_problem_file
 from colloc.gaits.regime import Free
 from colloc.gaits.robot import Robot
-from colloc.gaits.robot_model import Model, read_model
 from colloc.mechanics.chain import Chain
 from colloc.results import limit_use
 from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED
@@ -33,6 +32,7 @@ from colloc.system.progress import duration
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
+    from colloc.gaits.robot_model import Model
 
 _ROLLING = 0.02  # coefficient of friction of a wheel along
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
@@ -187,7 +187,11 @@ def init(options: argparse.Namespace) -> int:
     ):
         if getattr(options, one) is not None and getattr(options, other):
             raise ProblemError(f"--{one} and --{other} exclude each other; see colloc init --help.")
-    model = None if source is None else read_model(source)
+    model: Model | None = None
+    if source is not None:
+        from colloc.gaits.robot_model import read_model
+
+        model = read_model(source)
     lengths = options.lengths or options.links or [float(_FEWEST)]
     if model:
         lengths = model.lengths

@@ -70,10 +70,12 @@ def solve(
     begin, run = time.monotonic(), Run(keep, problem, progress)
     try:
         with run.active(seconds):
+            reachable = with_reachable_distance(problem)
             if search == FULL and problem.gait.free:
-                solution = certify_answer(problem, solve_directly(problem))
+                solution = certify_answer(reachable, solve_directly(reachable))
             else:
-                solution = _solve(problem, starts, accept)
+                solution = _solve(reachable, starts, accept)
+            _say_reach(solution)
     except KeyboardInterrupt:
         clear_interrupt()
         over = time.monotonic() - begin >= seconds
@@ -87,8 +89,6 @@ def solve(
 
 
 def _solve(problem: Problem, starts: int | None, accept: Callable[[Iterate], bool]) -> Solution:
-    asked = problem.least_distance
-    problem = with_reachable_distance(problem)
     explored, failure = None, ""
     if starts != 1 and problem.gait.free:
         try:
@@ -104,16 +104,21 @@ def _solve(problem: Problem, starts: int | None, accept: Callable[[Iterate], boo
         solutions += _finish_best(problem, follow_rest(problem, explored))
     solution = choose(problem, solutions)
     solution.starts, solution.others = explored.starts, tuple(explored.others)
-    least = {aim.name: least for aim, least in problem.at_least}.get("distance")
+    if failure and not solution.success:
+        why = failure[:1].upper() + failure[1:]
+        solution.message = f"{solution.message} {why}".strip()
+    return solution
+
+
+def _say_reach(solution: Solution) -> None:
+    """Say in the message that no gait goes the `least_distance`."""
+    asked = solution.problem.least_distance
+    least = {aim.name: least for aim, least in solution.problem.at_least}.get("distance")
     if asked is not None and least is not None and least < asked:
         solution.message = (
             f"The farthest gait goes {2 * least:.3g} body lengths a period, less than the "
             f"{asked:g} asked for, so half of that was: {least:.3g}. {solution.message}"
         ).strip()
-    if failure and not solution.success:
-        why = failure[:1].upper() + failure[1:]
-        solution.message = f"{solution.message} {why}".strip()
-    return solution
 
 
 def _finish_best(problem: Problem, optima: Sequence[Iterate]) -> list[Solution]:

@@ -37,6 +37,12 @@ def test_a_distance_that_can_be_reached_is_kept_and_costs_efficiency():
     assert solution.value == pytest.approx(stated.value, rel=1e-6)
 
 
+def test_the_full_program_by_itself_keeps_it_too():
+    problem = Problem("far", body=Chain((0.25,) * 4), least_distance=0.22, **HOW)
+    solution = colloc.solve(problem, search="full")
+    assert [least for _, least in solution.problem.at_least] == [0.22]
+
+
 def test_the_first_line_of_a_gait_that_nobody_sees_says_so():
     problem = Problem(
         "twitch", guess=colloc.ellipse(0, 0.06, 0.05), smallest_shape_speed=0.02, **HOW
