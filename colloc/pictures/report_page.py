@@ -27,7 +27,7 @@ from colloc.pictures.figure import Panel, mesh_errors, panels, robot_panels
 from colloc.pictures.movie import Frames, frames
 from colloc.pictures.style import INK, figure_style
 from colloc.results.motion import foot_kinds, hinges
-from colloc.results.robot import SLOW_ENOUGH, RobotSheet
+from colloc.results.robot import SLOW_ENOUGH, RobotSheet, in_si
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -79,6 +79,7 @@ def report_page(
         problem=problem,
         certificate=certificate,
         solved=solution.status == SOLVED,
+        si=in_si(solution),
         slow=slow,
         gravity=GRAVITY,
         dry=dry,

@@ -1,5 +1,6 @@
 """A robot in SI units is a problem without dimensions; what it says follows every change of it."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -167,3 +168,11 @@ def test_a_film_of_a_robot_takes_its_time(tmp_path):
     path = solution.animate(tmp_path / "a.gif", periods=1, fps=10, width=200)
     with Image.open(path) as film:
         assert film.n_frames * film.info["duration"] == pytest.approx(1500)
+
+
+def test_the_first_line_of_a_page_of_a_robot_is_in_its_units(slow_robot, tmp_path):
+    page = slow_robot.report(tmp_path / "robot.html").read_text(encoding="utf-8")
+    speed = 100 * in_si(slow_robot)["speed_m_per_s"]
+    assert re.search(
+        rf'class="headline">{re.escape(f"{speed:.3g}")} cm/s, [\d.e+]+ J per metre', page
+    )

@@ -120,7 +120,7 @@ if (typeof document !== "undefined") (function () {
     motion = crawl(body, { amplitude: angle("amplitude"), lag: angle("lag"), offset: angle("offset") }, mu, 1e-3, steps);
     const per = motion.work > 1e-9 ? (motion.distance / motion.work).toFixed(4) : "0";
     said.textContent = Number.isFinite(motion.work)
-      ? `${motion.distance.toFixed(4)} body lengths a cycle, work ${motion.work.toFixed(4)}: d/W ${per}; turns by ${(motion.turn * 180 / Math.PI).toFixed(1)}°`
+      ? `${motion.distance.toFixed(4)} body lengths a cycle, work ${motion.work.toFixed(4)}: d/W ${per}; turns by ${(Math.round(1800 * motion.turn / Math.PI) / 10 + 0).toFixed(1)}°`
       : "no balance was found: change a slider a little";
     const points = motion.frames.flatMap(frame => frame.points), side = k => points.map(point => point[k]);
     box = [0, 1].map(k => [Math.min(...side(k)) - 0.05, Math.max(...side(k)) + 0.05]);
