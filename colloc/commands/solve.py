@@ -110,13 +110,13 @@ def _in_units(**units: float) -> Callable[[str], float]:
         number, unit = re.fullmatch(r"\s*([-+.\deE]*[\d.])\s*([a-z/]*)\s*", text).groups()  # type: ignore[union-attr]
         return float(number) * (units[unit] if unit else 1.0)
 
-    def checked(text: str) -> float:
+    def convert(text: str) -> float:
         try:
             return read(text)
         except (AttributeError, KeyError):
             raise ValueError(text) from None
 
-    return checked
+    return convert
 
 
 @cli.command(
@@ -227,7 +227,7 @@ def init(options: argparse.Namespace) -> int:
         known = ", ".join(f"{name}={value!r}" for name, value in _known(model, {}).items())
         more = f"    # in SI units, with `Robot` imported: robot=Robot(period=..., {known}),\n"
     smallest = min(options.mu, _ROLLING) if "Wheel(" in floor else options.mu
-    has_inertia = bool(robot) and Robot(**robot).derived(0.0, smallest)["froude"] != 0
+    has_inertia = bool(robot) and Robot(**robot).dimensionless(0.0, smallest)["froude"] != 0
     parts = ("Foot", "Friction", "Harmonic", "Pad", "Problem", "Robot", "Wheel")
     needs = "Friction Harmonic Problem" + " Robot" * bool(robot)
     content = _TEMPLATE.format(

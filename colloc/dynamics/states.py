@@ -298,7 +298,7 @@ class _Linear:
 
 
 def _prefix_products(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of affine maps ``x -> x t + c`` in log2 n steps."""
+    """Prefix products of affine maps ``x -> x t + c`` in log2 n steps."""
     t, c, reach = t.copy(), c.copy(), 1
     while reach < len(t):
         c[reach:] += c[:-reach] @ t[reach:]

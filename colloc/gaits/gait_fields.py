@@ -120,7 +120,7 @@ def problem_fields(problem: Any) -> dict[str, Any]:
     return {
         f.name: plain.get(f.name, value)
         for f in dataclasses.fields(problem)
-        if f.name not in problem.derived
+        if f.name not in problem.derived_fields
         and ((value := getattr(problem, f.name)) != f.default or f.metadata != STATED_IF_SET)
     }
 

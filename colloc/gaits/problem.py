@@ -252,16 +252,16 @@ class Problem:
                 raise ProblemError(
                     f"{name} follows from the robot, in SI units: leave it out, or the robot."
                 )
-        derived = self.robot.derived(self.grade, self.law.smallest)
+        derived = self.robot.dimensionless(self.grade, self.law.smallest)
         self._fill(objective=derived.pop("objective"))
         self._set(**derived)
 
     @property
-    def derived(self) -> set[str]:
+    def derived_fields(self) -> set[str]:
         """Names of the fields that follow from others."""
         usual, names = EFFICIENCY, set[str]()
         if self.robot is not None:
-            usual = self.robot.derived(self.grade, self.law.smallest)["objective"]
+            usual = self.robot.dimensionless(self.grade, self.law.smallest)["objective"]
             names |= {*DERIVED}
         return names | {"objective"} if self.objective == usual else names
 
@@ -521,7 +521,7 @@ class Problem:
 
     def with_(self, **changes: object) -> Problem:
         """A copy with some fields changed, validated anew."""
-        stated = {name: getattr(type(self), name) for name in self.derived} | changes
+        stated = {name: getattr(type(self), name) for name in self.derived_fields} | changes
         return dataclasses.replace(self, **stated)
 
     @property

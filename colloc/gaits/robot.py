@@ -108,7 +108,7 @@ class Robot:
         root = math.sqrt(self.length / self.pressing(grade))
         return (PathLimit(SPEED_OF_ROBOT, "speed", _scaled(self.max_speed, root)).on(n_joint),)
 
-    def derived(self, grade: float, smallest_friction: float) -> dict[str, Any]:
+    def dimensionless(self, grade: float, smallest_friction: float) -> dict[str, Any]:
         """The objective and the fields `DERIVED` of a problem on such a grade; without inertia if
         it does not count beside the smallest coefficient of friction."""
         pressing = self.pressing(grade)

@@ -41,7 +41,7 @@ class Model(NamedTuple):
 
 @dataclass(eq=False)
 class _Part:
-    """What moves as one, in the world's axes."""
+    """A rigid part in the axes of the world."""
 
     name: str
     parent: _Part | None = None
@@ -115,7 +115,7 @@ def _urdf(root: Element) -> list[_Part]:
         raise ProblemError("its joints must lead from one link to every other one, on one way.")
     parts = [_Part(tops[0])]
 
-    def placed(element: Element, frame: Any, of: str) -> Any:
+    def frame_of(element: Element, frame: Any, of: str) -> Any:
         (place, turn), origin = frame, element.find("origin")
         own = Rotation.from_euler("xyz", _row(origin, "rpy", "0 0 0", of)).as_matrix()
         return place + turn @ _row(origin, "xyz", "0 0 0", of), turn @ own
@@ -123,7 +123,7 @@ def _urdf(root: Element) -> list[_Part]:
     def grow(name: str, part: _Part, frame: Any) -> None:
         link, of = links[name], f'link "{name}"'
         for each in link.findall("inertial"):
-            part.weigh(_row(each.find("mass"), "value", "0", of), placed(each, frame, of)[0])
+            part.weigh(_row(each.find("mass"), "value", "0", of), frame_of(each, frame, of)[0])
         kinds = []
         for use in ("visual", "collision"):
             shapes = [(x, y) for x in link.findall(use) for y in x.findall("geometry/*")]
@@ -133,13 +133,13 @@ def _urdf(root: Element) -> list[_Part]:
                 if shape.tag != "box":
                     r, length = (_row(shape, x, "0", of) for x in ("radius", "length"))
                     size = np.append(r, 0.5 * length)
-                part.solid(shape.tag, size, *placed(each, frame, of))
+                part.solid(shape.tag, size, *frame_of(each, frame, of))
                 if use == "collision" and kinds[1] == {"sphere"} < kinds[0] | {"sphere"}:
-                    middle = placed(each, frame, of)[0]  # of a sphere under something else
+                    middle = frame_of(each, frame, of)[0]  # of a sphere under something else
                     parts.append(_Part("", part, "", _FOOT, middle, np.eye(3)[2]))
         for joint, child in carried[name]:
             kind, of = joint.get("type", ""), f'joint "{joint.get("name")}"'
-            where, axes = own = placed(joint, frame, of)
+            where, axes = own = frame_of(joint, frame, of)
             if kind == "fixed":
                 grow(child, part, own)
                 continue
@@ -177,7 +177,7 @@ def _mjcf(root: Element) -> list[_Part]:
     for default in root.findall("default"):
         inherit(default, {})
 
-    def placed(element: Element, frame: Any, of: str) -> Any:
+    def frame_of(element: Element, frame: Any, of: str) -> Any:
         place, turn = frame
         own = Rotation.from_quat(np.roll(_row(element, "quat", "1 0 0 0", of), -1))
         if element.get("euler"):
@@ -186,14 +186,14 @@ def _mjcf(root: Element) -> list[_Part]:
 
     def grow(body: Element, part: _Part | None, usual: str, above: Any) -> None:
         usual, of = body.get("childclass", usual), f'body "{body.get("name")}"'
-        place, turn = frame = placed(body, above, of)
+        place, turn = frame = frame_of(body, above, of)
 
-        def found(tag: str) -> list[Element]:
+        def elements(tag: str) -> list[Element]:
             table = [classes.get(x.get("class", usual), {}) for x in body.findall(tag)]
             both = zip(table, body.findall(tag), strict=True)
             return [Element(tag, names.get(tag, {}) | x.attrib) for names, x in both]
 
-        joints = found("joint") if part else []  # of the first body they place it in the world
+        joints = elements("joint") if part else []  # of the first body they place it in the world
         part = part or _Part(body.get("name", ""))
         for joint in joints:
             kind = joint.get("type", "hinge")
@@ -207,10 +207,10 @@ def _mjcf(root: Element) -> list[_Part]:
             raise ProblemError(f"{of} has {len(joints)} joints: a chain has one between two links.")
         if part not in parts:
             parts.append(part)
-        for each in (inertial := found("inertial")):
-            part.weigh(_row(each, "mass", "0", of), placed(each, frame, of)[0])
-        for geom in found("geom"):
-            size, (middle, axes) = _row(geom, "size", "", of), placed(geom, frame, of)
+        for each in (inertial := elements("inertial")):
+            part.weigh(_row(each, "mass", "0", of), frame_of(each, frame, of)[0])
+        for geom in elements("geom"):
+            size, (middle, axes) = _row(geom, "size", "", of), frame_of(geom, frame, of)
             if geom.get("fromto"):
                 ends = _row(geom, "fromto", "0 0 0 0 0 1", of).reshape(2, 3) @ turn.T
                 middle, half = place + ends.mean(axis=0), 0.5 * (ends[1] - ends[0])

@@ -93,7 +93,7 @@ class Axle:
 
     @property
     def kernel_numbers(self) -> tuple[float, ...]:
-        """Those of the part across, then of the part along."""
+        """Numbers of the part across, then of the part along."""
         across, along = _Across(mu_t=self.sideways), _Across(mu_t=self.rolling)
         return across.kernel_numbers + along.kernel_numbers
 

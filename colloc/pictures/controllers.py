@@ -100,7 +100,7 @@ class Servo:
         }
 
 
-def commented(facts: Mapping[str, Any], mark: str = "#") -> list[str]:
+def comment_lines(facts: Mapping[str, Any], mark: str = "#") -> list[str]:
     """Lines of comment, each a JSON value."""
     return [f"{mark} {key}: {json.dumps(value)}" for key, value in facts.items()]
 
@@ -117,7 +117,7 @@ def joint_trajectory(
     def row(values: np.ndarray) -> str:  # without exponents, which not all readers know
         return f"[{', '.join(f'{x:.6f}' for x in np.round(values, 6) + 0.0)}]"
 
-    lines = ["# trajectory_msgs/msg/JointTrajectory [rad, rad/s]", *commented(facts)]
+    lines = ["# trajectory_msgs/msg/JointTrajectory [rad, rad/s]", *comment_lines(facts)]
     lines += [f"joint_names: [{', '.join(names)}]", "points:"]
     clock = np.rint(1e9 * (time - time[0])).astype(int)
     for nanoseconds, position, velocity in zip(clock.tolist(), angles.T, speeds.T, strict=True):
@@ -143,7 +143,7 @@ def c_table(
     parts = {"ramp": ("once, from straight, at rest", time < 0), "cycle": ("for ever", time >= 0)}
     parts = {part: each for part, each in parts.items() if each[1].any()}
     counts = [f"{stem}_{part}_samples = {each[1].sum()}" for part, each in parts.items()]
-    lines = [*commented(facts, "//"), f"#ifndef {stem}_h", f"#define {stem}_h"]
+    lines = [*comment_lines(facts, "//"), f"#ifndef {stem}_h", f"#define {stem}_h"]
     lines.append(f"enum {{ {', '.join([f'{stem}_joints = {len(rows)}', *counts])} }};")
     for name in ("rate_hz", "period_s"):
         lines.append(f"static const float {stem}_{name} = {facts[name]!r}f;")

@@ -38,7 +38,7 @@ from colloc.mechanics.friction import Friction
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.pictures import render
-from colloc.pictures.controllers import Servo, c_table, commented, joint_trajectory
+from colloc.pictures.controllers import Servo, c_table, comment_lines, joint_trajectory
 from colloc.results.motion import RigidMotion
 from colloc.results.robot import (
     RobotSheet,
@@ -257,7 +257,7 @@ def write_export(
     motors = [f"{gait.coordinate}_{j + 1}" for j in range(table.shape[1])]
     if path.suffix == ".csv":
         names = [f"{joint}_{unit}" for unit in columns for joint in motors]
-        lines = [*commented(facts), ",".join(["time_s", *names])]
+        lines = [*comment_lines(facts), ",".join(["time_s", *names])]
         samples = np.vstack([time, *columns.values()]).T
         lines += [",".join(f"{x:.9g}" for x in row) for row in samples]
         write_text(path, "\n".join(lines) + "\n")

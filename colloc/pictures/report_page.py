@@ -161,7 +161,7 @@ def _picture(
 
 
 def _toy(body: Body, law: Any) -> dict[str, Any] | None:
-    """What sliders of a page need: of a chain up to eight links that lie on the floor."""
+    """Numbers for the sliders of a page; None but for a chain up to eight links that lies flat."""
     if (
         type(body) is not Chain
         or body.feet

@@ -314,7 +314,7 @@ class Solution:
 
     @property
     def is_tiny(self) -> bool:
-        """Whether hardly anybody would see the gait: all joints of a chain move by less than 8
+        """True if hardly anybody would see the gait: all joints of a chain move by less than 8
         degrees, or the body by less than a fiftieth of its length a period."""
         if self.answer.program == PRESCRIBED:
             return False

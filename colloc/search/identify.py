@@ -365,7 +365,7 @@ class _Fit:
         return x
 
     def covariance(self, x: np.ndarray, samples: Uncertainty | None) -> tuple[float, np.ndarray]:
-        """How many residuals in a row are alike, and the covariance of x."""
+        """Number of residuals in a row that are alike, and the covariance of x."""
         places, angles = self.off(x)
         blocks = [each for each in (places.real, places.imag, angles) if each.size]
         alike = max(1.0, *map(correlation_time, blocks))
@@ -382,7 +382,7 @@ class _Fit:
         return alike, covariance
 
     def say(self, direction: np.ndarray) -> str:
-        """What it means that the motion does not show a change of x."""
+        """Sentence about a change of x that the motion does not show."""
         change = np.zeros(len(self.names))
         change[self.free] = direction / np.abs(direction).max()
         # any factor of all is left out, so as to name few

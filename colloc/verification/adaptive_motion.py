@@ -90,7 +90,7 @@ def totals_along(
 def whole_totals(
     quantities: Iterable[Quantity], path: Path
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Those of quantities that need no forces over a period, and their errors."""
+    """Totals over a period of quantities that need no forces, and their errors."""
     values, errors = {}, {}
     for each in [each for each in quantities if not each.needs_forces]:
         value, rougher = (

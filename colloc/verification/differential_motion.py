@@ -231,7 +231,7 @@ class GaitOnSlope:
     def totals(
         self, ran: Course, aim: float, quantities: Iterable[Quantity], ends: np.ndarray = _END
     ) -> np.ndarray:
-        """Those of quantities that need forces up to ascending phases, ``(k, n)``, to an error."""
+        """Totals of quantities that need forces up to ascending phases, ``(k, n)``, to an error."""
         return _sums(
             lambda t: self.instants(t, ran.at(t)[0])[0], _forced(quantities), ran.phases, aim, ends
         )
