@@ -61,12 +61,12 @@ class Admissible(NamedTuple):
         near = self.gait.through(gait)
         source = gait if gait.is_series else near
         stated = {each.name: getattr(source, each.name) for each in self.static}
-        kept = stated.get("theta") is not None and self.gait.in_phase(near)
+        kept = stated.get("theta") is not None and self.gait.is_synchronous(near)
         static = []
         for name, lower, upper, guess in self.static:
             known = kept if name == "theta" else stated[name] is not None
             static.append(np.clip(stated[name], lower, upper) if known else guess)
-        return np.append(self.gait.nearest(near) if kept else self.gait.parameters(near), static)
+        return np.append(self.gait.project(near) if kept else self.gait.parameters(near), static)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         lower, upper = self.gait.bounds(self.body, widest(self.joint_limit))

@@ -440,13 +440,13 @@ class Inertial(QuasiStatic):
         states, _, held = equations.solve(rates, first, near)
         return states, out, held
 
-    def alone(
+    def solve_intervals(
         self, mesh: Mesh, shapes: Shapes, along: Trajectory, begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Outputs and final states of every interval from initial states ``(n_state, n)``, sought
         near states at the points; and whether they exist, ``(n,)``."""
         equations, froude = self.equations(mesh, shapes.unit), self.froude_at(shapes, along.static)
-        states, ends, found = equations.alone(
+        states, ends, found = equations.solve_intervals(
             lambda states: self._rates(shapes, states, froude)[1], begins, near
         )
         return self._rates(shapes, states, froude)[0], ends, found

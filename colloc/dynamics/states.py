@@ -30,7 +30,7 @@ _LEAST_SHARE = 1 / 16
 """Give up if the damping factor falls below this."""
 _FAR = np.errstate(over="ignore", invalid="ignore")
 """Far from any motion states overflow."""
-_ALONE, _FOUND = 60, 1e-9
+_MOST_ITERATIONS, _FOUND = 60, 1e-9
 
 
 class Rates(NamedTuple):
@@ -138,7 +138,7 @@ class CollocatedStates:
             x = trial
         return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
 
-    def alone(
+    def solve_intervals(
         self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """States of every interval by itself from begins ``(n_state, n)``; its ends ``(n_state,
@@ -158,7 +158,7 @@ class CollocatedStates:
             return now, left_over, by_interval(left_over)
 
         (now, left_over, off), states = residual(near), near
-        for _ in range(_ALONE):
+        for _ in range(_MOST_ITERATIONS):
             if (off < _CLOSED).all():
                 break
             linear = _Linear(self._a, self._b, now.on_states)

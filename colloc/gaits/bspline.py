@@ -259,9 +259,9 @@ class Splines(LinearClass):
         apart = np.abs(edges[:, None] - corners).min(axis=1)
         return np.union1d(edges[apart > _AT_A_CORNER], corners)
 
-    def nearest(self, gait: Any) -> np.ndarray:
+    def project(self, gait: Any) -> np.ndarray:
         if not self.relative_delta or getattr(gait, "basis", None) == self:
-            return super().nearest(gait)
+            return super().project(gait)
         times = self.pieces
         if self._has_corners_of(gait):
             points = gait.vertices

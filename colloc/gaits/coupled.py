@@ -143,7 +143,7 @@ class Coupled(LinearClass):
         """The gait of the motors that is nearest to one of the joints."""
         joints = self.joint_map(gait.n_joint)
         if getattr(gait, "basis", None) == self:
-            return self.gait.member(self.nearest(gait), joints.n_motor)
+            return self.gait.member(self.project(gait), joints.n_motor)
         return self.gait.through(gait.transform(joints.inverse))
 
     def motor_gait(self, gait: Any) -> Any:

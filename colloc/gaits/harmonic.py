@@ -228,13 +228,13 @@ class Harmonic(LinearClass):
         gait = gait.resize(self.harmonics)
         if self.symmetry != BILATERAL:
             gait = shift_phase(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
-        return self.nearest(gait)
+        return self.project(gait)
 
-    def nearest(self, gait: Fourier) -> np.ndarray:
+    def project(self, gait: Fourier) -> np.ndarray:
         table = gait.resize(self.harmonics).table
         return np.linalg.lstsq(self._basis(gait.n_joint), table.ravel(), rcond=None)[0]
 
-    def in_phase(self, gait: Fourier) -> bool:
+    def is_synchronous(self, gait: Fourier) -> bool:
         return self.symmetry == BILATERAL or bool(abs(gait.sin[0, 0]) < SAME_START)
 
     def through(self, gait: Any) -> Fourier:

@@ -243,9 +243,9 @@ class LinearClass:
     # from gaits to parameters
     def parameters(self, gait: Any) -> np.ndarray:
         """Parameters of the member nearest to a gait."""
-        return self.nearest(gait)
+        return self.project(gait)
 
-    def nearest(self, gait: Any) -> np.ndarray:
+    def project(self, gait: Any) -> np.ndarray:
         """Parameters of the member nearest to a gait in its phase, in least squares."""
         if getattr(gait, "basis", None) == self:
             return np.linalg.lstsq(self._basis(gait.n_joint), gait.table.ravel(), rcond=None)[0]
@@ -253,7 +253,7 @@ class LinearClass:
         angles = (gait.angles(self.instants) - self.offset(gait.n_joint)).T
         return np.linalg.lstsq(matrix.reshape(angles.size, -1), angles.ravel(), rcond=None)[0]
 
-    def in_phase(self, gait: Any) -> bool:
+    def is_synchronous(self, gait: Any) -> bool:
         """True if a gait starts in the phase in which members do."""
         return True
 

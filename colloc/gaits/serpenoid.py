@@ -149,9 +149,9 @@ class Serpenoid(Harmonic):
         amplitudes = (-wave[k - 1].imag if sine else wave[k - 1].real for k, sine in self._waves)
         return np.array([lag, *offset, *amplitudes])
 
-    nearest = parameters
+    project = parameters
 
-    def in_phase(self, gait: Fourier) -> bool:
+    def is_synchronous(self, gait: Fourier) -> bool:
         return abs(self._lag_and_start(gait)[1]) <= SAME_START
 
     def _lag_and_start(self, gait: Fourier) -> tuple[float, float]:

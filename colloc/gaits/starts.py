@@ -278,7 +278,7 @@ def to_class(
     )
 
 
-def prolong(problem: Any, gait: Any, gait_class: Any, **changes: object) -> Any:
+def warm_start(problem: Any, gait: Any, gait_class: Any, **changes: object) -> Any:
     """The problem in another class, from a known optimum, with delta as to the shape speed."""
     relative = problem.delta / (1.0 if problem.gait.relative_delta else problem.guess.length)
     delta = relative * (1.0 if gait_class.relative_delta else gait.length)

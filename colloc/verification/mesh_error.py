@@ -286,7 +286,7 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     if exact.alone is not None:
         # momenta, perhaps theta
         states, near = (at[: len(kind.states)] for at in (at_edges, exact.at(mesh.times)))
-        out, ends, solved = exact.alone(mesh, shapes, along, states[:, :-1], near)
+        out, ends, solved = exact.solve_intervals(mesh, shapes, along, states[:, :-1], near)
         local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
         rotation = local.rotations - theta
         energy = (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1) - work

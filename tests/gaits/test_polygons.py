@@ -7,7 +7,7 @@ import pytest
 from colloc import BSpline, Chain, Corners, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import shift_phase
-from colloc.gaits.starts import prolong
+from colloc.gaits.starts import warm_start
 from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.verification.replay import replay
@@ -122,9 +122,9 @@ def test_replay_does_not_depend_on_the_pace_of_a_polygon():
 
 def test_delta_keeps_its_meaning_from_class_to_class():
     stated = Problem("p", ellipse(0, 1.5, 1.0), gait=Harmonic(1, "bilateral"), delta=1e-3)
-    path = prolong(stated, stated.guess, Polygon(4, "bilateral"))
+    path = warm_start(stated, stated.guess, Polygon(4, "bilateral"))
     assert path.delta * stated.guess.length == pytest.approx(1e-3)
-    back = prolong(path, stated.guess, Harmonic(2, "bilateral"))
+    back = warm_start(path, stated.guess, Harmonic(2, "bilateral"))
     assert back.delta == pytest.approx(1e-3)
 
 

@@ -10,9 +10,9 @@ from colloc.gaits.starts import (
     largest_factor,
     latin_hypercube,
     latin_hypercube_gait,
-    prolong,
     to_body,
     to_class,
+    warm_start,
 )
 from colloc.mechanics.contact import crossing_depth
 from colloc.search.solve import solve
@@ -118,7 +118,7 @@ def test_a_large_gait_is_admissible_in_any_chain(lengths):
 def test_a_truncated_path_that_overshoots_its_limits_starts_a_search_all_the_same():
     square = Corners(np.array([[3.1, 3.1, -3.1, -3.1], [-0.6, 0.6, 0.6, -0.6]]))
     problem = Problem("square", square, gait=Polygon(4), intervals=16)
-    stated = prolong(problem, square, Harmonic(3))
+    stated = warm_start(problem, square, Harmonic(3))
     angles = stated.guess.angles(PHASES)
     assert 3.0 < np.abs(angles).max() <= np.pi
     assert crossing_depth(THREE, angles).max() == 0
@@ -149,7 +149,7 @@ def test_a_richer_class_keeps_what_its_seed_had():
     problem = Problem(
         "five", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"), delta=1.5e-3, intervals=60
     )
-    near = prolong(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"))
+    near = warm_start(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"))
     from_afar = solve(near.with_(delta_start=100 * near.delta), 1)
     assert from_afar.status == "solved"
     assert from_afar.certificate.efficiency < 0.4003
@@ -164,6 +164,6 @@ def test_a_hexagon_is_an_octagon_with_corners_on_its_sides():
         "bilateral",
     )
     problem = Problem("six", hexagon, gait=Polygon(6, "bilateral"), intervals=60)
-    solution = solve(prolong(problem, hexagon, Polygon(8, "bilateral"), intervals=80), 1)
+    solution = solve(warm_start(problem, hexagon, Polygon(8, "bilateral"), intervals=80), 1)
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.4015
