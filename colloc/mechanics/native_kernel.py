@@ -58,6 +58,8 @@ _SIGNATURES = {
     "colloc_motion": "ppppp",
     "colloc_momenta": "pdpipp",
     "colloc_repeating": "pdnippppppp",
+    "colloc_period": "nippppdp" + "pdpppp",
+    "colloc_period_vjp": "nippppdp" + "ppippp",
 }
 _SLOW = (
     "the balance is solved by NumPy, 10 to 60 times more slowly: the compiled kernel was not "
@@ -70,7 +72,7 @@ _COULOMB = Friction()
 
 def native_kernel(body: Any = None, friction: Law = _COULOMB) -> ctypes.CDLL | None:
     """The compiled kernel, or None where NumPy has to do."""
-    usable = body is None or (body.in_series and _parameters(body, friction))
+    usable = body is None or (body.in_series and chain_parameters(body, friction))
     return library() if usable else None
 
 
@@ -126,7 +128,7 @@ def call_for_all(
     arguments, of which arrays that are written to are contiguous; on several threads if there are
     many pieces. `MemoryError` if it fails."""
     angles, rates = (np.ascontiguousarray(a, dtype=float) for a in (moving.angles, moving.rates))
-    n_time, chain = angles.shape[1], _parameters(moving.body, moving.friction)
+    n_time, chain = angles.shape[1], chain_parameters(moving.body, moving.friction)
     given = [np.ascontiguousarray(a) if isinstance(a, np.ndarray) else a for a in arguments]
 
     def call(first: int) -> int:
@@ -144,7 +146,7 @@ def call_for_all(
 
 
 @lru_cache(maxsize=64)
-def _parameters(body: Any, friction: Law) -> tuple[Any, ...]:
+def chain_parameters(body: Any, friction: Law) -> tuple[Any, ...]:
     """Number of links, lengths, masses, and contacts with their laws; empty where the
     kernel lacks a law."""
     law = np.array(body.contact.kernel_numbers(friction), dtype=float)

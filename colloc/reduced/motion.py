@@ -18,6 +18,7 @@ import numpy as np
 
 from colloc.dynamics.chain import of_torques
 from colloc.dynamics.collocated import CollocatedPose, point_weights, stage_weights
+from colloc.dynamics.compiled_period import CompiledPeriod
 from colloc.dynamics.dynamics import (
     OMEGA,
     OUTPUTS,
@@ -42,16 +43,37 @@ class _State:
 
     v: np.ndarray
     delta: float
+    mesh: Mesh
     shapes: Shapes
-    along: Trajectory
+    heading: float
+    """Initial orientation."""
+    z: np.ndarray
+    """Tail velocities, ``(3, n_point)``."""
     out: np.ndarray
     """Rotation rate, velocity of the centre and power over the pace, ``(4, n_point)``."""
-    pose: CollocatedPose
-    passed: PeriodTotals
+    along: Trajectory | None
+    """None if the compiled kernel differentiates the motion."""
+    totals: PeriodTotals | None = None
     values: dict[str, float] = field(default_factory=dict)
 
     @cached_property
+    def pose(self) -> CollocatedPose:
+        omega, cx, cy, _ = self.out * self.shapes.pace
+        return CollocatedPose.on_mesh(self.mesh, omega, np.array([cx, cy]), self.heading)
+
+    @cached_property
+    def passed(self) -> PeriodTotals:
+        if self.totals is not None:
+            return self.totals
+        assert self.along is not None
+        pose, power = self.pose, (self.out[3] * self.shapes.pace)[self.mesh.points]
+        work = float((stage_weights(self.mesh) * power).sum())
+        rotation = float(pose.theta[-1]) - self.heading
+        return PeriodTotals(complex(pose.place[-1]), rotation, work, self.along.static)
+
+    @cached_property
     def slopes(self) -> tuple[np.ndarray, np.ndarray]:
+        assert self.along is not None
         return self.along.slopes()
 
 
@@ -66,8 +88,8 @@ class ReducedMotion:
         self.kind, self.mesh, self._space = kind, mesh, space
         self._n_static = len(kind.static_parameters)
         self._integrals = integrals
-        self._weight = stage_weights(mesh)
         self._point_weight = point_weights(mesh)
+        self._compiled = CompiledPeriod.of(kind, mesh)
         self._last: _State | None = None
         self._differentiated: _State | None = None
         self.solves = 0
@@ -79,20 +101,23 @@ class ReducedMotion:
             return last
         angles, rates, pace = self._space.at(v)
         shapes, static = Shapes(angles, rates, delta, pace=pace), v[v.size - self._n_static :]
-        along = kind.simulate(mesh, shapes, static, *self._start(shapes, static))
+        of_v = v.copy(), delta, mesh, shapes, kind.initial_heading(static)
+        begin, compiled = self._differentiated or last, self._compiled
         self.solves += 1
+        if compiled is not None and begin is not None and compiled.covers(shapes):
+            found = compiled.simulate(shapes, begin.z)
+            if found is not None:
+                z, out, totals = found
+                self._last = _State(*of_v, z, out, None, totals)
+                return self._last
+        along = kind.simulate(mesh, shapes, static, *self._start(shapes, static))
         now = along.now
         out = np.vstack([now.z[OMEGA] - self._even(pace), now.centre, now.power])
         out[:, ~along.held] = np.nan
-        omega, cx, cy, power = out * pace
-        first = kind.initial_heading(static)
-        pose = CollocatedPose.on_mesh(mesh, omega, np.array([cx, cy]), first)
-        work = float((self._weight * power[mesh.points]).sum())
-        passed = PeriodTotals(complex(pose.place[-1]), float(pose.theta[-1]) - first, work, static)
-        found = _State(v.copy(), delta, shapes, along, out, pose, passed)
+        state = _State(*of_v, now.z, out, along)
         if not kind.states or along.held.all():  # a search goes on from states that there are
-            self._last = found
-        return found
+            self._last = state
+        return state
 
     def _even(self, pace: np.ndarray | float) -> float:
         """Rotation rate of axes that turn evenly, over the pace."""
@@ -103,18 +128,17 @@ class ReducedMotion:
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
         """States and tail velocities to start from: those of the last gait, or of the last one
         differentiated moved along its slopes."""
-        near, kind = self._differentiated, self.kind
-        if near is not None and not kind.states:
-            moved = [shapes.angles - near.shapes.angles, shapes.rates - near.shapes.rates]
-            by = np.einsum("ijt,jt->it", near.slopes[0][:3], np.concatenate(moved))
-            return None, near.along.now.z + by
-        if self._last is None:
-            return None, None
-        along = self._last.along
-        states = along.states.copy()
-        for each, moved in zip(kind.static_parameters, static - along.static, strict=True):
-            states[[each.name == state for state in kind.states]] += moved
-        return states, along.now.z
+        kind, last, begin = self.kind, self._last, self._differentiated
+        if kind.states and last is not None and last.along is not None:
+            states = last.along.states.copy()
+            for each, moved in zip(kind.static_parameters, static - last.along.static, strict=True):
+                states[[each.name == state for state in kind.states]] += moved
+            return states, last.z
+        if begin is None or begin.along is None:
+            begin = begin or last
+            return None, None if begin is None else begin.z
+        shape = [shapes.angles - begin.shapes.angles, shapes.rates - begin.shapes.rates]
+        return None, begin.z + np.einsum("ijt,jt->it", begin.slopes[0][:3], np.concatenate(shape))
 
     def values(self, v: np.ndarray, delta: float) -> dict[str, float]:
         """Totals of a period and integrals by name; NaN where there is no motion."""
@@ -204,6 +228,7 @@ class ReducedMotion:
         """(angles, rates, accelerations, momenta, Froude number) that joint torques depend on."""
         kind: Any = self.kind
         mesh, (angles, rates, *_) = self.mesh, s.shapes
+        assert s.along is not None
         momenta = s.along.states[: len(STATES)]
         if t is not None:
             angles, rates = self._space.at_times(s.v, t)
@@ -217,7 +242,7 @@ class ReducedMotion:
 
     def _instants(self, s: _State) -> Instants:
         shapes = s.shapes._replace(pace=1.0)
-        return self.kind.instants(shapes, s.pose.theta_on(self.mesh), s.along.now.z)
+        return self.kind.instants(shapes, s.pose.theta_on(self.mesh), s.z)
 
     def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
         """Derivatives of `values`, ``(n,)`` each."""
@@ -249,8 +274,12 @@ class ReducedMotion:
     ) -> np.ndarray:
         """Derivatives ``(m, n)`` of numbers that depend on totals of the period, on (angles, rates,
         orientation) at the points, ``(m, 2 n_joint + 1, n_point)``, and on the pace."""
-        mesh, kind, pace = self.mesh, self.kind, s.shapes.pace
+        mesh, kind, pace, compiled = self.mesh, self.kind, s.shapes.pace, self._compiled
         self._differentiated = s
+        if compiled is not None and compiled.covers(s.shapes):
+            on_shape, more = compiled.vjp(s.shapes, s.z, s.out, gradients)
+            on_shape += on_points[:, :-1].transpose(0, 2, 1)
+            return np.asarray(self._space.vjp(s.v, on_shape, on_pace + more))
         slopes, on_states = s.slopes
         by_theta = on_points[:, -1][:, mesh.points]
         rows, on_begin, _ = kind.vjp(mesh, s.pose, gradients, on_states * pace, by_theta, by_states)

@@ -2,16 +2,18 @@
    colloc/mechanics/balance.py. Positions and velocities are added up from the reference outwards, so that links that rest
    beside it keep the relative precision of their speed. */
 
-#pragma once
+#ifndef CHAIN_H
+#define CHAIN_H
 
-#include <stddef.h>
+#include "law.h"
 
 typedef struct {
     int number;                        /* from 0 at the tail */
-    double length, mass, cos, sin; /* mass: over the body's; direction in the body frame */
-    double x, y;             /* midpoint, seen from that of the reference */
-    double rate;             /* of the joint behind the link (0 at the tail) */
-    double load_x, load_y;   /* its share of an outside force on the body */
+    double length, mass;               /* mass: over the body's */
+    Real cos, sin;                     /* direction in the body frame */
+    Real x, y;                         /* midpoint, seen from that of the reference */
+    Real rate;                         /* of the joint behind the link (0 at the tail) */
+    Real load_x, load_y;               /* its share of an outside force on the body */
 } Link;
 
 #include "parts.h"
@@ -20,15 +22,15 @@ typedef struct {
    without one. */
 typedef struct {
     Vector3 force;
-    double merit;
+    Real merit;
 } Total;
 
 /* Directions of the links, from joint angles that lie `stride` apart; and rates in units of `speed`. */
 static inline void find_directions(
-    const int n, Link *link, const double *length, const double *mass, const double *angle, const double *rate, double speed,
+    const int n, Link *link, const double *length, const double *mass, const Real *angle, const Real *rate, Real speed,
     ptrdiff_t stride)
 {
-    double phi = 0.0;
+    Real phi = ZERO;
     for (int i = 0; i < n; ++i) {
         if (i > 0)
             phi += angle[(i - 1) * stride];
@@ -37,13 +39,13 @@ static inline void find_directions(
         link[i].mass = mass[i];
         link[i].cos = cos(phi);
         link[i].sin = sin(phi);
-        link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : 0.0;
-        link[i].load_x = link[i].load_y = 0.0;
+        link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : ZERO;
+        link[i].load_x = link[i].load_y = ZERO;
     }
 }
 
 /* Friction and load on a link, in the body's axes. */
-static inline void outer_force(const Link *link, const Sliding *k, double f[2])
+static inline void outer_force(const Link *link, const Sliding *k, Real f[2])
 {
     f[0] = k->fs * link->cos - k->fn * link->sin + link->load_x;
     f[1] = k->fs * link->sin + k->fn * link->cos + link->load_y;
@@ -51,7 +53,7 @@ static inline void outer_force(const Link *link, const Sliding *k, double f[2])
 
 static inline void find_midpoints(const int n, Link *link, const int reference)
 {
-    link[reference].x = link[reference].y = 0.0;
+    link[reference].x = link[reference].y = ZERO;
     for (int i = reference + 1; i < n; ++i) {
         link[i].x = link[i - 1].x + 0.5 * (link[i - 1].length * link[i - 1].cos + link[i].length * link[i].cos);
         link[i].y = link[i - 1].y + 0.5 * (link[i - 1].length * link[i - 1].sin + link[i].length * link[i].sin);
@@ -65,8 +67,8 @@ static inline void find_midpoints(const int n, Link *link, const int reference)
 /* Velocity of link `to` in body-frame axes from that of its neighbour `from`, one further (side 1) or back (-1). */
 static inline void pass_on(Vector3 v, const Link *from, const Link *to, int side)
 {
-    const double w = side > 0 ? v[2] + to->rate : v[2] - from->rate;
-    const double a = 0.5 * side * from->length * v[2], b = 0.5 * side * to->length * w;
+    const Real w = side > 0 ? v[2] + to->rate : v[2] - from->rate;
+    const Real a = 0.5 * side * from->length * v[2], b = 0.5 * side * to->length * w;
     v[0] -= a * from->sin + b * to->sin;
     v[1] += a * from->cos + b * to->cos;
     v[2] = w;
@@ -118,25 +120,23 @@ static inline void find_velocities_from_tail(const int n, const Link *link, Slid
     find_velocities(n, link, k, 0, z);
 }
 
-static inline double load_power(const Link *link, const Sliding *k)
+static inline Real load_power(const Link *link, const Sliding *k)
 {
     Vector3 v;
-    if (link->load_x == 0.0 && link->load_y == 0.0)
-        return 0.0;
     link_velocity(link, k, v);
     return link->load_x * v[0] + link->load_y * v[1];
 }
 
 /* Everything at velocity z of the reference. */
 static inline Total evaluate(
-    const int n, const Link *link, Sliding *k, const int reference, const Vector3 z, const Law *law, double delta)
+    const int n, const Link *link, Sliding *k, const int reference, const Vector3 z, const Law *law, Real delta)
 {
-    Total total = {{0.0, 0.0, 0.0}, 0.0};
+    Total total = {{ZERO, ZERO, ZERO}, ZERO};
     find_velocities(n, link, k, reference, z);
     for (int i = 0; i < n; ++i) {
         find_roots(&k[i], law, &link[i], delta);
         find_force(&k[i], law, &link[i]);
-        double f[2];
+        Real f[2];
         outer_force(&link[i], &k[i], f);
         total.force[0] += f[0];
         total.force[1] += f[1];
@@ -151,12 +151,12 @@ static inline Total evaluate(
 
 /* Sum over links of G^T K G, with G = d(vs, vn, w)/dz and K the slopes or the secants of friction. */
 static inline void pull_back(
-    const int n, const Link *link, const Sliding *k, const Law *law, double delta, bool newton, Matrix3 total)
+    const int n, const Link *link, const Sliding *k, const Law *law, Real delta, bool newton, Matrix3 total)
 {
     memset(total, 0, sizeof(Matrix3));
     for (int i = 0; i < n; ++i) {
-        const double c = link[i].cos, s = link[i].sin;
-        const double arm_s = link[i].x * s - link[i].y * c, arm_n = link[i].x * c + link[i].y * s;
+        const Real c = link[i].cos, s = link[i].sin;
+        const Real arm_s = link[i].x * s - link[i].y * c, arm_n = link[i].x * c + link[i].y * s;
         Matrix3 K;
         find_slopes(&k[i], law, &link[i], delta, !newton, K);
         for (int j = 0; j < 3; ++j) {
@@ -172,9 +172,4 @@ static inline void pull_back(
     }
 }
 
-/* Largest magnitude; infinite if any of them is not a number. */
-static inline double largest_of(const Vector3 v)
-{
-    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
-    return isfinite(v[0] + v[1] + v[2]) ? largest : INFINITY;
-}
+#endif

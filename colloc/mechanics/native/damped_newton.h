@@ -33,6 +33,13 @@ typedef struct {
     long long iterations;
 } State;
 
+/* Largest magnitude; infinite if any of them is not a number. */
+static inline double largest_of(const Vector3 v)
+{
+    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    return isfinite(v[0] + v[1] + v[2]) ? largest : INFINITY;
+}
+
 /* x with A x = b after symmetric scaling to a unit diagonal, to which `shift` is added; zero where that is singular. */
 static inline void solve3(Matrix3 A, const Vector3 b, double shift, Vector3 x)
 {
@@ -136,6 +143,17 @@ static inline void iterate(const int n, State *s, double delta, double tolerance
         }
     }
     s->iterations += iterations;
+}
+
+/* How fast the slowest part of the link moves at most, up to a factor: the anchor is where that is least. */
+static inline double slowest_speed(const Sliding *k, const Law *law, const Link *link)
+{
+    double least = INFINITY;
+    for (int i = first_part(law, link->number); i < last_part(law, link->number); ++i) {
+        const PartSliding *own = &k->part[i];
+        least = fmin(least, fabs(own->vs) + fabs(own->vn) + 0.5 * law->part[i].length * fabs(own->w));
+    }
+    return least;
 }
 
 /* Move the anchor to the slowest link; whether that is another one. */

@@ -41,6 +41,30 @@ static int done(Played *b, bool ready)
     return ready ? 0 : 1;
 }
 
+/* Velocity of the tail that balances instant t, from that of `start` (3, n_time) or from rest (NULL), and the state there. */
+static void balance_instant(
+    const Played *b, State *s, ptrdiff_t t, const double *load, const double *start, double tolerance, long long budget, int method,
+    Vector3 tail)
+{
+    double own_delta;
+    const double speed = unit_of(b, t, load, &own_delta);
+    find_instant(b, t, speed, load);
+    s->anchor = b->n / 2;
+    s->iterations = 0;
+    memset(s->velocity, 0, sizeof s->velocity);
+    if (start) {
+        for (int i = 0; i < 3; ++i)
+            tail[i] = start[i * b->n_time + t] / speed;
+        find_velocities_from_tail(b->n, s->link, s->now, tail);
+        link_velocity(&s->link[s->anchor], &s->now[s->anchor], s->velocity);
+    }
+    solve(b->n, s, own_delta, tolerance, budget, method);
+    find_velocities(b->n, s->link, s->now, s->anchor, s->velocity);
+    tail_velocity(s->link, s->now, tail);
+    for (int i = 0; i < 3; ++i)
+        tail[i] *= speed, s->velocity[i] *= speed;
+}
+
 /* Velocities in balance, from `start` (3, n_time) or from rest (NULL), under `load` (2, n_time) or none. */
 int colloc_balance(
     CHAIN, const double *load, const double *start, double tolerance, long long budget, int method, double *z, double *residual,
@@ -50,25 +74,11 @@ int colloc_balance(
     const bool ready = new_room(&played);
     State s = {.law = played.law, .link = played.link, .now = played.k, .trial = played.k + n};
     for (ptrdiff_t t = first; t < last && ready; ++t) {
-        double own_delta;
-        const double speed = unit_of(&played, t, load, &own_delta);
         Vector3 tail;
-        find_instant(&played, t, speed, load);
-        s.anchor = n / 2;
-        s.iterations = 0;
-        memset(s.velocity, 0, sizeof s.velocity);
-        if (start) {
-            for (int i = 0; i < 3; ++i)
-                tail[i] = start[i * n_time + t] / speed;
-            find_velocities_from_tail(n, s.link, s.now, tail);
-            link_velocity(&s.link[s.anchor], &s.now[s.anchor], s.velocity);
-        }
-        solve(n, &s, own_delta, tolerance, budget, method);
-        find_velocities(n, s.link, s.now, s.anchor, s.velocity);
-        tail_velocity(s.link, s.now, tail);
+        balance_instant(&played, &s, t, load, start, tolerance, budget, method, tail);
         for (int i = 0; i < 3; ++i) {
-            z[i * n_time + t] = tail[i] * speed;
-            anchor_velocity[i * n_time + t] = s.velocity[i] * speed;
+            z[i * n_time + t] = tail[i];
+            anchor_velocity[i * n_time + t] = s.velocity[i];
         }
         residual[t] = s.residual;
         iterations[t] = s.iterations;
@@ -157,5 +167,121 @@ int colloc_repeating(
         memcpy(values, q.values, MOMENTA_ROWS * (size_t)n_time * sizeof *values);
     }
     free_periods(&q);
+    return done(&played, ready);
+}
+
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__linux__)
+#define FOR_EVERY_PROCESSOR __attribute__((target_clones("avx2", "default")))
+#else
+#define FOR_EVERY_PROCESSOR
+#endif
+
+/* An instant that the lanes lost, from where they began: more slowly and surely. */
+static bool rescue(const Played *b, State *s, ptrdiff_t t, const double *start, double tolerance, double tail[3])
+{
+    balance_instant(b, s, t, NULL, start, tolerance, 2000, AUTO, tail);
+    return s->residual <= tolerance;
+}
+
+#include "period.h"
+
+/* Motion through a period from tail velocities `start` (3, n_time): those in balance `z` (3, n_time), out (OUTPUTS, n_time), and the
+   totals. `lost`: the number of instants without a balance. */
+FOR_EVERY_PROCESSOR
+int colloc_period(CHAIN, MESH, const double *start, double tolerance, double *z, double *out, double *totals, long long *lost)
+{
+    Played played = PLAYED;
+    const Mesh mesh = MESHED;
+    Room room = {0};
+    const bool ready = new_room(&played) && new_lanes(&room, n, &played.law);
+    State state = {.law = played.law, .link = played.link, .now = played.k, .trial = played.k + n};
+    double *turned = malloc(2 * (size_t)(n_interval * s) * sizeof *turned);
+    *lost = 0;
+    for (ptrdiff_t t = first; t < last && ready && turned; t += LANES) {
+        Vector3 velocity;
+        Lanes own_delta;
+        const Lanes speed = lane_instants(&played, &room, t, start, velocity, &own_delta);
+        const Mask at_rest = lane_balance(n, &room, &played.law, own_delta, tolerance, velocity);
+        if (ANY(~at_rest)) {
+            tail_velocity(room.link, room.k, velocity);
+            for (int i = 0; i < LANES && t + i < last; ++i) {
+                double tail[3];
+                if (at_rest[i])
+                    continue;
+                *lost += !rescue(&played, &state, t + i, start, tolerance, tail);
+                for (int j = 0; j < 3; ++j)
+                    velocity[j][i] = tail[j] / speed[i];
+            }
+            find_velocities_from_tail(n, room.link, room.k, velocity);
+            link_velocity(&room.link[n / 2], &room.k[n / 2], velocity);
+            evaluate(n, room.link, room.k, n / 2, velocity, &played.law, own_delta);
+        }
+        Lanes x = ZERO, y = ZERO, power = ZERO;
+        for (int i = 0; i < n; ++i) {
+            const Sliding *k = &room.k[i];
+            link_velocity(&room.link[i], k, velocity);
+            x += played.mass[i] * velocity[0], y += played.mass[i] * velocity[1];
+            power -= k->fs * k->vs + k->fn * k->vn + k->couple * k->w;
+        }
+        tail_velocity(room.link, room.k, velocity);
+        for (int i = 0; i < 3; ++i)
+            lane_store(z + i * n_time, t, n_time, velocity[i] * speed);
+        lane_store(out + TURNING * n_time, t, n_time, velocity[2] * speed);
+        lane_store(out + ALONG * n_time, t, n_time, x * speed);
+        lane_store(out + ACROSS * n_time, t, n_time, y * speed);
+        lane_store(out + POWER * n_time, t, n_time, power * speed);
+    }
+    double way;
+    const double even = even_rate(&mesh, &way);
+    for (ptrdiff_t t = 0; t < n_time; ++t)
+        out[TURNING * n_time + t] -= even;
+    if (ready && turned)
+        find_pose(&mesh, out, turned, totals);
+    free(turned), free(room.memory);
+    return done(&played, ready && turned);
+}
+
+/* Derivatives of `count` numbers along angles and rates (count, n_time, 2 (n - 1)) and along the pace (count, n_time), from those along
+   the totals, `on` (count, TOTALS), at a motion that `colloc_period` states. */
+FOR_EVERY_PROCESSOR
+int colloc_period_vjp(
+    CHAIN, MESH, const double *z, const double *out, int count, const double *on, double *on_shape, double *on_pace)
+{
+    Played played = PLAYED;
+    const Mesh mesh = MESHED;
+    const int columns = 2 * (n - 1);
+    Room room = {0};
+    double totals[TOTALS];
+    double *turned = malloc((2 * (size_t)(n_interval * s) + (size_t)(count * OUTPUTS * n_time)) * sizeof *turned);
+    const bool ready = new_room(&played) && new_lanes(&room, n, &played.law) && turned;
+    double *weights = turned + 2 * n_interval * s;
+    if (ready) {
+        find_pose(&mesh, out, turned, totals);
+        for (int row = 0; row < count; ++row)
+            find_weights(&mesh, out, turned, on + TOTALS * row, weights + row * OUTPUTS * n_time, on_pace + row * n_time);
+    }
+    for (ptrdiff_t t = first; t < last && ready; t += LANES) {
+        Vector3 velocity;
+        Matrix3 left, inverse;
+        Lanes own_delta, pulled[columns];
+        const Lanes speed = lane_instants(&played, &room, t, z, velocity, &own_delta), paced = lane_load(pace, t, n_time);
+        evaluate(n, room.link, room.k, n / 2, velocity, &played.law, own_delta);
+        pull_back(n, room.link, room.k, &played.law, own_delta, true, left);
+        inverse3(left, inverse);
+        for (int i = 0; i < n; ++i)
+            find_slopes(&room.k[i], &played.law, &room.link[i], own_delta, false, room.K[i]);
+        for (int row = 0; row < count; ++row) {
+            Lanes on_out[OUTPUTS];
+            for (int i = 0; i < OUTPUTS; ++i)
+                on_out[i] = paced * lane_load(weights + (row * OUTPUTS + i) * n_time, t, n_time);
+            pull_to_shape(n, room.link, room.k, room.K, inverse, on_out, pulled);
+            for (int j = 0; j < columns; ++j) {
+                const Lanes value = j < n - 1 ? pulled[j] * speed : pulled[j];
+                for (int i = 0; i < LANES && t + i < n_time; ++i)
+                    on_shape[(row * n_time + t + i) * columns + j] = value[i];
+            }
+        }
+    }
+    free(turned), free(room.memory);
     return done(&played, ready);
 }

@@ -2,55 +2,35 @@
    the elliptic one, each part's own; in closed form on pads, with the names of colloc/mechanics/friction.py, where the formulas
    are explained. */
 
-#pragma once
-
-#include <math.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
+#include "law.h"
 
 /* Rows of three numbers: a motion (two velocities and a rotation rate), forces and a torque. */
-typedef double Vector3[3];
+typedef Real Vector3[3];
 typedef Vector3 Matrix3[3];
-
-/* Where it is, seen from the link's midpoint; the direction it is turned to; its length, 0 of a foot; its weight, of a pad per
-   length; and its law. */
-typedef struct {
-    double along, offset, cos, sin, length, pressure;
-    double mu_t, mu_f, mu_b, stretch_f, stretch_b;
-} Part;
-
-typedef struct {
-    int n_part;
-    double largest;
-    bool associated;
-    const double *first; /* number of the first part of every link, and of all parts */
-    const Part *part;
-} Law;
 
 /* Velocities of a part and, of a pad, everything that its friction is expressed through; then the friction itself. */
 typedef struct {
-    double vs, vn, w;
-    double stretched; /* vs, as it counts in the speed */
-    double a2, r0r1, S, Q, g, h; /* of a foot S alone, the speed r */
-    double fs, fn, couple;
+    Real vs, vn, w;
+    Real stretched; /* vs, as it counts in the speed */
+    Real a2, r0r1, S, Q, g, h; /* of a foot S alone, the speed r */
+    Real fs, fn, couple;
 } PartSliding;
 
-static inline double tangential(const Part *p, double vs)
+static inline Real tangential(const Part *p, Real vs)
 {
-    return vs > 0 ? p->mu_f : p->mu_b;
+    return SELECT(vs > 0, p->mu_f, p->mu_b);
 }
 
-static inline double stretch(const Part *p, double vs)
+static inline Real stretch(const Part *p, Real vs)
 {
-    return vs > 0 ? p->stretch_f : p->stretch_b;
+    return SELECT(vs > 0, p->stretch_f, p->stretch_b);
 }
 
 /* (g - 1)/q: sum of q^j / (2 j + 3) below the limit of 0.1, where the closed form would cancel. */
-static inline double h_series(double q)
+static inline Real h_series(Real q)
 {
-    const double q2 = q * q;
-    double even = 1.0 / 31, odd = 1.0 / 33; /* two sums, each half as long a chain of operations */
+    const Real q2 = q * q;
+    Real even = ZERO + 1.0 / 31, odd = ZERO + 1.0 / 33; /* two sums, each half as long a chain of operations */
     even = even * q2 + 1.0 / 27, odd = odd * q2 + 1.0 / 29;
     even = even * q2 + 1.0 / 23, odd = odd * q2 + 1.0 / 25;
     even = even * q2 + 1.0 / 19, odd = odd * q2 + 1.0 / 21;
@@ -62,38 +42,35 @@ static inline double h_series(double q)
 }
 
 /* Fill in a2 to h from vs, vn, w. */
-static inline void find_roots_of_part(PartSliding *k, const Part *p, double delta)
+static inline void find_roots_of_part(PartSliding *k, const Part *p, Real delta)
 {
     const double length = p->length;
-    const double vs = k->stretched = stretch(p, k->vs) * k->vs;
+    const Real vs = k->stretched = stretch(p, k->vs) * k->vs;
     if (!(length > 0)) {
         k->S = sqrt(vs * vs + k->vn * k->vn + delta * delta);
         return;
     }
-    const double a2 = vs * vs + delta * delta, half = 0.5 * length * k->w;
-    const double y0 = k->vn - half, y1 = k->vn + half;
-    const double r0 = sqrt(a2 + y0 * y0), r1 = sqrt(a2 + y1 * y1);
-    const double S = r0 + r1, r0r1 = r0 * r1, T = a2 + y0 * y1;
+    const Real a2 = vs * vs + delta * delta, half = 0.5 * length * k->w;
+    const Real y0 = k->vn - half, y1 = k->vn + half;
+    const Real r0 = sqrt(a2 + y0 * y0), r1 = sqrt(a2 + y1 * y1);
+    const Real S = r0 + r1, r0r1 = r0 * r1, T = a2 + y0 * y1;
     k->a2 = a2, k->r0r1 = r0r1, k->S = S;
     /* a^2 / P; P = T + r0 r1 cancels where T < 0 */
-    k->Q = T < 0 ? (r0r1 - T) / (4.0 * half * half) : a2 / (r0r1 + T);
-    const double root_q = 2.0 * fabs(half) / S, q = root_q * root_q;
-    if (q < 0.1)
-        k->h = h_series(q);
-    else {
-        const double one = 1.0 + root_q;
-        k->h = (0.5 * log(one * one * k->Q * S * S / (2.0 * a2)) / root_q - 1.0) / q;
-    }
+    k->Q = SELECT(T < 0, (r0r1 - T) / (4.0 * half * half), a2 / (r0r1 + T));
+    const Real root_q = 2.0 * fabs(half) / S, q = root_q * root_q, one = 1.0 + root_q;
+    k->h = h_series(q);
+    if (ANY(q >= 0.1))
+        k->h = SELECT(q >= 0.1, (0.5 * log(one * one * k->Q * S * S / (2.0 * a2)) / root_q - 1.0) / q, k->h);
     k->g = 1.0 + q * k->h;
 }
 
 /* Friction on the part from a2 to h; its pressure multiplies it, here and below. */
 static inline void find_force_of_part(PartSliding *k, const Part *p)
 {
-    const double length = p->length, per_S = 1.0 / k->S, l3 = length * length * length;
-    const double mu_s = p->pressure * tangential(p, k->vs), mu_t = p->pressure * p->mu_t;
+    const double length = p->length, l3 = length * length * length, mu_t = p->pressure * p->mu_t;
+    const Real per_S = 1.0 / k->S, mu_s = p->pressure * tangential(p, k->vs);
     if (!(length > 0)) {
-        k->fs = -mu_s * k->stretched / k->S, k->fn = -mu_t * k->vn / k->S, k->couple = 0.0;
+        k->fs = -mu_s * k->stretched / k->S, k->fn = -mu_t * k->vn / k->S, k->couple = ZERO;
         return;
     }
     k->fs = -mu_s * k->stretched * 2.0 * length * k->g * per_S;
@@ -102,7 +79,7 @@ static inline void find_force_of_part(PartSliding *k, const Part *p)
 }
 
 /* Dissipation potential of the part: mu times the integral of r. */
-static inline double dissipation_of_part(const PartSliding *k, const Part *p)
+static inline Real dissipation_of_part(const PartSliding *k, const Part *p)
 {
     if (!(p->length > 0))
         return p->pressure * (p->mu_t * k->S);
@@ -111,28 +88,28 @@ static inline double dissipation_of_part(const PartSliding *k, const Part *p)
 
 /* Minus the derivative of (fs, fn, couple) with respect to (vs, vn, w); or, where `steep`, minus force over velocity with r frozen,
    the law of the paper's fixed point. */
-static inline void find_slopes_of_part(const PartSliding *k, const Part *p, double delta, bool steep, Matrix3 K)
+static inline void find_slopes_of_part(const PartSliding *k, const Part *p, Real delta, bool steep, Matrix3 K)
 {
-    const double vs = k->stretched, vn = k->vn, w = k->w, length = p->length, S = k->S, per_S = 1.0 / S;
-    const double mu_s = p->pressure * tangential(p, k->vs), mu_t = p->pressure * p->mu_t, more = stretch(p, k->vs);
-    const double l3 = length * length * length;
+    const double length = p->length, l3 = length * length * length, mu_t = p->pressure * p->mu_t;
+    const Real vs = k->stretched, vn = k->vn, w = k->w, S = k->S, per_S = 1.0 / S;
+    const Real mu_s = p->pressure * tangential(p, k->vs), more = stretch(p, k->vs);
     memset(K, 0, sizeof(Matrix3));
     if (!(length > 0)) {
-        const double es = steep ? 0.0 : vs / S, en = steep ? 0.0 : vn / S, ed = steep ? 1.0 : delta / S;
+        const Real es = steep ? ZERO : vs / S, en = steep ? ZERO : vn / S, ed = steep ? ZERO + 1.0 : delta / S;
         K[0][0] = more * mu_s * (en * en + ed * ed) / S, K[0][1] = -mu_s * es * en / S;
         K[1][0] = -more * mu_t * es * en / S, K[1][1] = mu_t * (es * es + ed * ed) / S;
     } else if (steep) {
-        const double I0 = 2.0 * length * k->g / S, I1 = -2.0 * vn * w * l3 * k->h / (S * S * S);
-        const double I2 = l3 / S * (0.5 * k->Q + (2.0 * vn * vn - k->a2) * k->h / (S * S));
+        const Real I0 = 2.0 * length * k->g / S, I1 = -2.0 * vn * w * l3 * k->h / (S * S * S);
+        const Real I2 = l3 / S * (0.5 * k->Q + (2.0 * vn * vn - k->a2) * k->h / (S * S));
         K[0][0] = more * mu_s * I0;
         K[1][1] = mu_t * I0, K[1][2] = K[2][1] = mu_t * I1, K[2][2] = mu_t * I2;
     } else {
-        const double per_r = 1.0 / k->r0r1, E = k->a2 + vn * vn;
-        const double a2J0 = length * S * k->Q * per_r, a2J1 = -vn * w * l3 * k->Q * per_r * per_S;
-        const double a2J2 = 2.0 * l3 * k->a2 * k->h * per_S * per_S * per_S + l3 * (E * k->Q - 0.5 * k->a2) * per_S * per_r;
-        const double y_r3 = 2.0 * vn * length * per_S * per_r;
-        const double sy_r3 = w * l3 * per_S * (2.0 * k->h * per_S * per_S + (k->Q - 0.5) * per_r);
-        const double along = a2J0 * (delta * delta / k->a2) + vn * y_r3 + w * sy_r3;
+        const Real per_r = 1.0 / k->r0r1, E = k->a2 + vn * vn;
+        const Real a2J0 = length * S * k->Q * per_r, a2J1 = -vn * w * l3 * k->Q * per_r * per_S;
+        const Real a2J2 = 2.0 * l3 * k->a2 * k->h * per_S * per_S * per_S + l3 * (E * k->Q - 0.5 * k->a2) * per_S * per_r;
+        const Real y_r3 = 2.0 * vn * length * per_S * per_r;
+        const Real sy_r3 = w * l3 * per_S * (2.0 * k->h * per_S * per_S + (k->Q - 0.5) * per_r);
+        const Real along = a2J0 * (delta * delta / k->a2) + vn * y_r3 + w * sy_r3;
         K[0][0] = more * mu_s * along, K[0][1] = -mu_s * vs * y_r3, K[0][2] = -mu_s * vs * sy_r3;
         K[1][0] = -more * mu_t * vs * y_r3, K[1][1] = mu_t * a2J0, K[1][2] = mu_t * a2J1;
         K[2][0] = -more * mu_t * vs * sy_r3, K[2][1] = mu_t * a2J1, K[2][2] = mu_t * a2J2;
@@ -141,19 +118,10 @@ static inline void find_slopes_of_part(const PartSliding *k, const Part *p, doub
 
 /* Velocities of the link, then the friction on it; and all parts of the body. */
 typedef struct {
-    double vs, vn, w;
-    double fs, fn, couple;
+    Real vs, vn, w;
+    Real fs, fn, couple;
     PartSliding *part;
 } Sliding;
-
-/* Of `FloorContact.kernel_numbers` in colloc/mechanics/floor_contact.py. */
-static Law law_of(const double *number)
-{
-    const int n_link = (int)number[0], n_part = (int)number[1];
-    const Part *part = (const Part *)(number + 5 + n_link);
-    Law law = {n_part, number[2], number[3] != 0, number + 4, part};
-    return law;
-}
 
 /* Of a chain of n links, so many times over; or NULL. */
 static Sliding *new_slidings(const int n, const int copies, const Law *law)
@@ -165,23 +133,13 @@ static Sliding *new_slidings(const int n, const int copies, const Law *law)
     return k;
 }
 
-static inline int first_part(const Law *law, const Link *link)
-{
-    return (int)law->first[link->number];
-}
-
-static inline int last_part(const Law *law, const Link *link)
-{
-    return (int)law->first[link->number + 1];
-}
-
 /* Velocities of the link's parts, and what the friction on them is expressed through. */
-static inline void find_roots(Sliding *k, const Law *law, const Link *link, double delta)
+static inline void find_roots(Sliding *k, const Law *law, const Link *link, Real delta)
 {
-    for (int i = first_part(law, link); i < last_part(law, link); ++i) {
+    for (int i = first_part(law, link->number); i < last_part(law, link->number); ++i) {
         const Part *f = &law->part[i];
         PartSliding *own = &k->part[i];
-        const double vs = k->vs - f->offset * k->w, vn = k->vn + f->along * k->w;
+        const Real vs = k->vs - f->offset * k->w, vn = k->vn + f->along * k->w;
         own->vs = f->cos * vs + f->sin * vn, own->vn = f->cos * vn - f->sin * vs, own->w = k->w;
         find_roots_of_part(own, f, delta);
     }
@@ -189,45 +147,34 @@ static inline void find_roots(Sliding *k, const Law *law, const Link *link, doub
 
 static inline void find_force(Sliding *k, const Law *law, const Link *link)
 {
-    k->fs = k->fn = k->couple = 0.0;
-    for (int i = first_part(law, link); i < last_part(law, link); ++i) {
+    k->fs = k->fn = k->couple = ZERO;
+    for (int i = first_part(law, link->number); i < last_part(law, link->number); ++i) {
         const Part *f = &law->part[i];
         PartSliding *own = &k->part[i];
         find_force_of_part(own, f);
-        const double fs = f->cos * own->fs - f->sin * own->fn, fn = f->sin * own->fs + f->cos * own->fn;
+        const Real fs = f->cos * own->fs - f->sin * own->fn, fn = f->sin * own->fs + f->cos * own->fn;
         k->fs += fs;
         k->fn += fn;
         k->couple += own->couple + f->along * fn - f->offset * fs;
     }
 }
 
-/* How fast the slowest part of the link moves at most, up to a factor: the anchor is where that is least. */
-static inline double slowest_speed(const Sliding *k, const Law *law, const Link *link)
+static inline Real dissipation(const Sliding *k, const Law *law, const Link *link)
 {
-    double least = INFINITY;
-    for (int i = first_part(law, link); i < last_part(law, link); ++i) {
-        const PartSliding *own = &k->part[i];
-        least = fmin(least, fabs(own->vs) + fabs(own->vn) + 0.5 * law->part[i].length * fabs(own->w));
-    }
-    return least;
-}
-
-static inline double dissipation(const Sliding *k, const Law *law, const Link *link)
-{
-    double total = 0.0;
-    for (int i = first_part(law, link); i < last_part(law, link); ++i)
+    Real total = ZERO;
+    for (int i = first_part(law, link->number); i < last_part(law, link->number); ++i)
         total += dissipation_of_part(&k->part[i], &law->part[i]);
     return total;
 }
 
 /* Slopes, or where `steep` secants, of the link's friction: the sum over its parts of turn' K turn, turn being the velocity of a
    part in its own directions per (vs, vn, w). */
-static inline void find_slopes(const Sliding *k, const Law *law, const Link *link, double delta, bool steep, Matrix3 total)
+static inline void find_slopes(const Sliding *k, const Law *law, const Link *link, Real delta, bool steep, Matrix3 total)
 {
     memset(total, 0, sizeof(Matrix3));
-    for (int i = first_part(law, link); i < last_part(law, link); ++i) {
+    for (int i = first_part(law, link->number); i < last_part(law, link->number); ++i) {
         const Part *f = &law->part[i];
-        const Matrix3 turn = {
+        const double turn[3][3] = {
             {f->cos, f->sin, f->along * f->sin - f->offset * f->cos},
             {-f->sin, f->cos, f->along * f->cos + f->offset * f->sin},
             {0.0, 0.0, 1.0}};
@@ -235,7 +182,7 @@ static inline void find_slopes(const Sliding *k, const Law *law, const Link *lin
         find_slopes_of_part(&k->part[i], f, delta, steep, K);
         for (int p = 0; p < 3; ++p)
             for (int j = 0; j < 3; ++j) {
-                const double moved = K[p][0] * turn[0][j] + K[p][1] * turn[1][j] + K[p][2] * turn[2][j];
+                const Real moved = K[p][0] * turn[0][j] + K[p][1] * turn[1][j] + K[p][2] * turn[2][j];
                 for (int row = 0; row < 3; ++row)
                     total[row][j] += turn[p][row] * moved;
             }

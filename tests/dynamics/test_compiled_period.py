@@ -1,0 +1,66 @@
+"""A period in one call of the kernel is that of the NumPy solvers, and so are its derivatives."""
+
+import numpy as np
+import pytest
+
+from colloc import Chain, Foot, Friction, Problem
+from colloc.dynamics.compiled_period import CompiledPeriod
+from colloc.dynamics.dynamics import Shapes
+from colloc.mechanics.native_kernel import native_kernel
+from colloc.reduced.motion import ReducedMotion
+from colloc.search.iterate import space_near
+from tests.shared.cases import cases
+from tests.shared.without_kernel import numpy_instead
+
+pytestmark = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
+ROUGH = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
+FEET = tuple(Foot(k) for k in range(3))
+CASES = """
+three links: gait=Harmonic(2)
+different friction each way: gait=Harmonic(2), friction=ROUGH
+an elliptic law: gait=Harmonic(2), friction=Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.5)
+seven links of many lengths: body=Chain((0.1, 0.2, 0.15, 0.1, 0.2, 0.1, 0.15)), friction=ROUGH
+links on feet: body=Chain(feet=FEET), gait=Harmonic(2)
+a wheel between two pads: body=Chain((0.3, 0.4, 0.3), feet=(Pad(0, 0.1, 0.6), Wheel(1), Pad(2)))
+half a period, and points that neighbours share: gait=Harmonic(1, "antipodal"), scheme="hermite-simpson"
+delta relative to the speed: gait=Polygon(4), friction=ROUGH
+turning as a whole: gait=Harmonic(2), rotation=0.7
+a number of points that no vector divides: gait=BSpline(7), intervals=7, scheme="radau-3"
+"""
+CASES = cases(CASES, globals())
+
+
+def numbers(problem, delta, seed=0):
+    """Totals and their gradients along a walk, with the motion before as the first guess."""
+    space, v = space_near(problem, problem.guess)
+    motion, rng, found = ReducedMotion(space.control.dynamics, space.mesh, space), None, []
+    rng = np.random.default_rng(seed)
+    for _ in range(4):
+        v = v + 0.02 * rng.normal(size=v.size)
+        values, slopes = motion.values(v, delta), motion.gradients(v, delta)
+        found.append(np.concatenate([[*values.values()], *slopes.values()]))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("delta", [1e-1, 1e-3, 1e-5])
+@pytest.mark.parametrize("case", CASES)
+def test_totals_and_gradients_are_those_of_numpy(case, delta):
+    problem = Problem("p", **({"intervals": 12} | CASES[case]))
+    compiled = numbers(problem, delta)
+    with numpy_instead():
+        reference = numbers(problem, delta)
+    scale = np.abs(reference).max(axis=1, keepdims=True)
+    # rounding of friction is 1e-16 / delta, and gradients hold it once more
+    np.testing.assert_allclose(compiled, reference, rtol=0, atol=1e-9 * scale.max())
+
+
+def test_instants_that_newton_loses_are_balanced_all_the_same():
+    problem = Problem("p", body=Chain((0.2,) * 5), friction=ROUGH, intervals=20)
+    space, v = space_near(problem, problem.guess)
+    angles, rates, pace = space.at(v)
+    compiled = CompiledPeriod.of(space.control.dynamics, space.mesh)
+    shapes, rng = Shapes(angles, rates, 1e-4, pace=pace), np.random.default_rng(0)
+    rest = compiled.simulate(shapes, np.zeros((3, angles.shape[1])))
+    for size in (1.0, 100.0, np.nan):
+        wild = compiled.simulate(shapes, size * rng.normal(size=(3, angles.shape[1])))
+        np.testing.assert_allclose(wild[0], rest[0], rtol=0, atol=1e-8)
