@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 
 _ROLLING = 0.02  # coefficient of friction of a wheel along
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
-_LARGEST, _ALIKE = 3.14, 1e-6  # angle of a joint [rad], and difference of parts that are the same
+_LARGEST, _ALIKE = 3.14, 1e-6  # angle of a joint [rad], difference of like densities
+_ANGLES = {"rad": 1.0, "deg": math.pi / 180}
 _MANY_INTERVALS, _SECONDS_PER_INTERVAL = 1000, 0.02
 EXIT = {
     SOLVED: OK,
@@ -45,25 +46,16 @@ EXIT = {
     INTERRUPTED: CODE_INTERRUPTED,
 }
 _WHEELS = "tuple(Wheel(link, rolling={rolling:g}, sideways={mu:g}) for link in range({links}))"
-_FLOOR = {
-    "": "    body=Chain({lengths}),",
-    "feet": """\
+_STANDS_ON = {
+    "feet": """
     # and what they stand on: feet on each link, evenly spread; or one by one,
-    # feet=(Foot(0), Wheel(1), ...)
-    body=Chain({lengths}, feet={feet}),""",
-    "wheels": f"""\
+    # feet=(Foot(0), Wheel(1), ...)""",
+    "wheels": """
     # and what they stand on: a wheel in the middle of each link, with its own friction
-    # in units of the weight
-    body=Chain(
-        {{lengths}},
-        feet={_WHEELS},
-    ),""",
-    "model": """\
+    # in units of the weight""",
+    "from": """
     # as {source} has it, with the same angles, which count from the tail and counter-clockwise,
-    # but for signs: {joints}
-    body=Chain(
-        {rows},
-    ),""",
+    # but for signs: {joints}""",
 }
 _SIZE = """\
     # distance that a gait must go in a period, in body lengths; where the farthest gait goes less,
@@ -82,8 +74,7 @@ from colloc import {names}
 
 PROBLEM = Problem(
     name="{name}",
-    # link lengths from tail to head; they add up to 1, the unit of length
-{floor}
+    # link lengths from tail to head; they add up to 1, the unit of length{floor}
     # what sliding sideways, forwards and backwards costs, in units of the weight;
     # friction does not depend on speed
     friction=Friction(mu_t={mu:g}, mu_f={mu:g}, mu_b={mu:g}),
@@ -100,23 +91,36 @@ PROBLEM = Problem(
     # guess=Fourier(mean, cos, sin) adds yours.
 )
 '''
-_STATED = ("length", "mass", "period", "max_speed", "max_torque", "idle_power", "backlash")
+_SI: dict[str, tuple[dict[str, float], str, str]] = {
+    "length": ({"m": 1.0, "cm": 0.01, "mm": 0.001}, "M", "of the stretched robot"),
+    "mass": ({"kg": 1.0, "g": 0.001}, "KG", "of the robot"),
+    "period": (
+        {"s": 1.0, "ms": 0.001},
+        "S",
+        "seconds per cycle; or the shortest and the longest, between which it is sought",
+    ),
+    "max_speed": (
+        {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30},
+        "V",
+        "of the joints [rad/s]",
+    ),
+    "max_torque": ({}, "M", "of the joints [N m]"),
+    "idle_power": ({}, "P", "that electronics draw [W]"),
+    "backlash": (_ANGLES, "ANGLE", "of a joint [rad]"),
+}
+"""What a robot is stated by: units of its option, and what they are."""
 
 
-def _in_units(**units: float) -> Callable[[str], float]:
+def _in_units(units: dict[str, float]) -> Callable[[str], float]:
     """Reader of a number that may end in one of these units; without one it is in the first."""
 
     def read(text: str) -> float:
-        number, unit = re.fullmatch(r"\s*([-+.\deE]*[\d.])\s*([a-z/]*)\s*", text).groups()  # type: ignore[union-attr]
-        return float(number) * (units[unit] if unit else 1.0)
+        match = re.fullmatch(r"\s*([-+.\deE]*[\d.])\s*([a-z/]*)\s*", text)
+        if not match or match[2] not in {"", *units}:
+            raise ValueError(text)
+        return float(match[1]) * units.get(match[2], 1.0)
 
-    def convert(text: str) -> float:
-        try:
-            return read(text)
-        except (AttributeError, KeyError):
-            raise ValueError(text) from None
-
-    return convert
+    return read
 
 
 @cli.command(
@@ -139,94 +143,74 @@ The file runs as it is; one that is there already is left alone. A robot of --le
         f"equal links (default: {_FEWEST}); or their lengths, tail to head, in any unit",
         nargs="+",
     ),
-    cli.option(float, "--lengths", "L", "of the links, as with --links", nargs="+"),
     cli.option(Path, "--from", "FILE", "URDF or MJCF of the robot, a planar chain"),
     cli.option(int, "--feet", "N", "feet on each link (default: none, links lie flat)"),
     cli.flag("--wheels", "a wheel in the middle of each link"),
-    cli.option(float, "--mu", "MU", "coefficient of friction (default: 1)", 1.0, least=0),
+    cli.option(float, "--mu", "MU", "coefficient of friction (default: the file's, or 1)", least=0),
     cli.option(
-        _in_units(rad=1.0, deg=math.pi / 180),
+        _in_units(_ANGLES),
         "--joint-limit",
         "ANGLE",
-        "largest angle of a joint [rad] (default: 3.14)",
+        f"largest angle of a joint [rad] (default: {_LARGEST})",
         least=0,
     ),
-    cli.option(
-        _in_units(m=1.0, cm=0.01, mm=0.001), "--length", "M", "of the stretched robot", least=0
-    ),
-    cli.option(_in_units(kg=1.0, g=0.001), "--mass", "KG", "of the robot", least=0),
-    cli.option(
-        _in_units(s=1.0, ms=0.001),
-        "--period",
-        "S",
-        "seconds per cycle; or the shortest and the longest, between which it is sought",
-        nargs="+",
-        least=0,
-    ),
-    cli.option(
-        _in_units(**{"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30}),
-        "--max-speed",
-        "V",
-        "of the joints [rad/s]",
-        least=0,
-    ),
-    cli.option(float, "--max-torque", "M", "of the joints [N m]", least=0),
-    cli.option(float, "--idle-power", "P", "that electronics draw [W]", least=0),
-    cli.option(
-        _in_units(rad=1.0, deg=math.pi / 180), "--backlash", "ANGLE", "of a joint [rad]", least=0
+    *(
+        cli.option(
+            _in_units(units),
+            f"--{name.replace('_', '-')}",
+            metavar,
+            what,
+            least=0,
+            **({"nargs": "+"} if name == "period" else {}),
+        )
+        for name, (units, metavar, what) in _SI.items()
     ),
 )
 def init(options: argparse.Namespace) -> int:
     path: Path = options.problem
     source: Path | None = getattr(options, "from")
-    for one, other in (
-        ("links", "lengths"),
-        ("feet", "wheels"),
-        ("from", "links"),
-        ("from", "lengths"),
-    ):
+    for one, other in (("feet", "wheels"), ("from", "links")):
         if getattr(options, one) is not None and getattr(options, other):
             raise ProblemError(f"--{one} and --{other} exclude each other; see colloc init --help.")
     model: Model | None = None
+    lengths = options.links or [float(_FEWEST)]
     if source is not None:
         from colloc.gaits.robot_model import read_model
 
         model = read_model(source)
-    lengths = options.lengths or options.links or [float(_FEWEST)]
-    if model:
         lengths = model.lengths
-    elif options.lengths is None and len(lengths) == 1:
+    elif len(lengths) == 1:
         if not lengths[0].is_integer():
             raise ProblemError(f"--links must be a whole number of links, not {lengths[0]:g}.")
         lengths = [1.0] * max(0, min(int(lengths[0]), _MOST + 1))
     if not _FEWEST <= (links := len(lengths)) <= _MOST:
         more = " or more" * (links > _MOST)
         raise ProblemError(f"a chain must have {_FEWEST} to {_MOST} links here, not {links}{more}.")
-    whole, largest = math.fsum(lengths), _LONGER * min(lengths)
-    if not (math.isfinite(whole) and 0 < max(lengths) <= largest):
+    whole = math.fsum(lengths)
+    if not (math.isfinite(whole) and 0 < max(lengths) <= _LONGER * min(lengths)):
         raise ProblemError(
             f"lengths of links must be positive numbers, the longest at most {_LONGER:g} times the "
             f"shortest, not {', '.join(f'{length:g}' for length in lengths)}."
         )
     if path.suffix != ".py":
         raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
-    feet, robot, limit = options.feet or 0, _stated_robot(options, model), options.joint_limit
     # raises for a name that files cannot have
-    Problem(path.stem, body=Chain(tuple(length / whole for length in lengths), feet=feet))
-    floor = _floor(options, model, lengths)
-    symmetric, limit = lengths == lengths[::-1], f"{options.joint_limit or _LARGEST:.6g}"
+    body = Chain(tuple(length / whole for length in lengths), feet=options.feet or 0)
+    Problem(path.stem, body=body)
+    mu = options.mu or (model and model.mu) or 1.0
+    robot, floor = _stated_robot(options, model), _body(options, model, lengths, mu)
+    limit = f"{options.joint_limit or _LARGEST:.6g}"
+    symmetric, more = lengths == lengths[::-1], _SIZE * ("idle_power" not in robot)
     if model:
         if options.joint_limit is None:
             each = [f"{b:.6g}" if a == -b else f"({a:.6g}, {b:.6g})" for a, b in model.limits]
             limit = each[0] if len({*each}) == 1 else f"({', '.join(each)})"
         # a body with more to it may differ from both ends
         symmetric &= not model.feet and "weights" not in floor and "(" not in limit
-    arguments = ", ".join(f"{name}={value!r}" for name, value in robot.items())
-    size, more = _SIZE * ("idle_power" not in robot), ""
     if model and not robot:
-        known = ", ".join(f"{name}={value!r}" for name, value in _known(model, {}).items())
-        more = f"    # in SI units, with `Robot` imported: robot=Robot(period=..., {known}),\n"
-    smallest = min(options.mu, _ROLLING) if "Wheel(" in floor else options.mu
+        known = _stated(_known(model))
+        more += f"    # in SI units, with `Robot` imported: robot=Robot(period=..., {known}),\n"
+    smallest = min(mu, _ROLLING) if "Wheel(" in floor else mu
     has_inertia = bool(robot) and Robot(**robot).dimensionless(0.0, smallest)["froude"] != 0
     parts = ("Foot", "Friction", "Harmonic", "Pad", "Problem", "Robot", "Wheel")
     needs = "Friction Harmonic Problem" + " Robot" * bool(robot)
@@ -236,9 +220,9 @@ def init(options: argparse.Namespace) -> int:
         name=path.stem,
         names=", ".join(["Chain", *(x for x in parts if x in needs or f"{x}(" in floor)]),
         floor=floor,
-        mu=options.mu,
+        mu=mu,
         joint_limit=limit,
-        robot=_ROBOT.format(robot=arguments) * bool(robot) + size + more,
+        robot=_ROBOT.format(robot=_stated(robot)) * bool(robot) + more,
         symmetry="bilateral" if symmetric and not has_inertia else "none",
     )
     try:
@@ -251,59 +235,60 @@ def init(options: argparse.Namespace) -> int:
     except ProblemError:
         path.unlink()
         raise
-    line = f"wrote {path}: a problem of {links} links. Change it, then: colloc solve {path}"
     facts: dict[str, Any] = {"status": "written", "file": str(path), "links": links}
-    lines = [line]
+    lines = [f"wrote {path}: a problem of {links} links. Change it, then: colloc solve {path}"]
     if model:
-        facts |= {"joints": model.joints, "notes": model.notes}
-        lines += [f"  {x}" for x in (f"angles in {source}: {model.joints}", *model.notes)]
+        notes = [*model.notes]
+        if options.mu is not None:
+            notes = [note for note in notes if "--mu" not in note]
         if "feet=" not in floor:
-            lines.append("  no wheels or feet are known: links lie on the floor (--feet, --wheels)")
+            notes.append("no wheels or feet are known: links lie on the floor (--feet, --wheels)")
+        facts |= {"joints": model.joints, "notes": notes}
+        lines += [f"  {x}" for x in (f"angles in {source}: {model.joints}", *notes)]
     cli.tell(options, facts, lines)
     return OK
 
 
-def _floor(options: argparse.Namespace, model: Model | None, lengths: list[float]) -> str:
-    """The line of the body in a problem file."""
+def _body(options: argparse.Namespace, model: Model | None, lengths: list[float], mu: float) -> str:
+    """The lines of the body in a problem file."""
 
     def shares(values: list[float]) -> str:
         return f"({', '.join(f'{x:.12g} / {math.fsum(values):.12g}' for x in values)})"
 
-    values = {"mu": options.mu, "rolling": _ROLLING, "links": len(lengths)}
+    rows, feet, kind = [shares(lengths)], model.feet if model else [], "from"
     if model is None:
         kind = "wheels" if options.wheels else "feet" if options.feet else ""
-        return _FLOOR[kind].format(lengths=shares(lengths), feet=options.feet, **values)
-    rows, whole, mass = [shares(lengths)], math.fsum(lengths), math.fsum(model.masses)
-    each = zip(lengths, model.masses, strict=False)
-    if any(abs(x / whole - m / mass) > _ALIKE for x, m in each):
-        rows.append(f"weights={shares(model.masses)}")
-    if options.wheels:
-        rows.append(f"feet={_WHEELS.format(**values)}")
-    elif options.feet or model.feet:
-        one_by_one = ", ".join(x.format(**values) for x in model.feet)
-        rows.append(f"feet={options.feet or f'({one_by_one})'}")
-    return _FLOOR["model"].format(
-        source=getattr(options, "from").name, joints=model.joints, rows=",\n        ".join(rows)
-    )
+    elif model.masses:
+        densities = [m / x for m, x in zip(model.masses, lengths, strict=True)]
+        if max(densities) > (1 + _ALIKE) * min(densities):
+            rows.append(f"weights={shares(model.masses)}")
+    if options.wheels or options.feet or feet:
+        each = _WHEELS if options.wheels else str(options.feet or f"({', '.join(feet)})")
+        rows.append(f"feet={each.format(mu=mu, rolling=_ROLLING, links=len(lengths))}")
+    about = {"source": getattr(options, "from").name, "joints": model.joints} if model else {}
+    inner = rows[0] if len(rows) == 1 else "\n        " + ",\n        ".join(rows) + ",\n    "
+    return f"{_STANDS_ON.get(kind, '').format(**about)}\n    body=Chain({inner}),"
 
 
-def _known(model: Model, stated: dict[str, Any]) -> dict[str, Any]:
+def _stated(values: dict[str, Any]) -> str:
+    return ", ".join(f"{name}={value!r}" for name, value in values.items())
+
+
+def _known(model: Model) -> dict[str, Any]:
     """Arguments of a `Robot` that its file states."""
-    speed = model.max_speed if len(stated.get("period", "1")) == 1 else []
     whole = {"length": [math.fsum(model.lengths)], "mass": [math.fsum(model.masses)]}
-    each = whole | {"max_speed": speed, "max_torque": model.max_torque}
+    each = whole | {"max_speed": model.max_speed, "max_torque": model.max_torque}
     rows = {name: [float(f"{x:.9g}") for x in values] for name, values in each.items()}
     return {x: y[0] if len({*y}) == 1 else y for x, y in rows.items() if y and min(y) > 0}
 
 
 def _stated_robot(options: argparse.Namespace, model: Model | None) -> dict[str, Any]:
     """Arguments of a `Robot`; none if no option speaks of it."""
-    robot = {name: x for name in _STATED if (x := getattr(options, name)) is not None}
+    robot = {name: x for name in _SI if (x := getattr(options, name)) is not None}
     if not robot:
         return {}
-    if model:
-        robot = _known(model, robot) | robot
-    if missing := [f"--{name}" for name in _STATED[:3] if name not in robot]:
+    robot = (_known(model) if model else {}) | robot
+    if missing := [f"--{name}" for name in [*_SI][:3] if name not in robot]:
         raise ProblemError(
             f"a robot in SI units needs --length, --mass and --period; {' and '.join(missing)} "
             f"{'is' if len(missing) == 1 else 'are'} missing."

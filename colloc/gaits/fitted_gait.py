@@ -19,7 +19,7 @@ from scipy.special import fdtrc, stdtrit
 
 from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Fourier
-from colloc.gaits.record import FEWEST, LARGEST, read_record
+from colloc.gaits.record import FEWEST, LARGEST, Record, read_record
 from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
 
@@ -65,17 +65,21 @@ class FittedGait:
     periods: float = 1.0  # that the samples hold
     period: float = 1.0  # in the unit of time of a file
     uncertainty: Uncertainty | None = None  # None for a series
-    taken: str = ""  # `colloc.gaits.record.Record.taken`
-    centre: int = 0  # `colloc.gaits.record.Record.centre`
+    record: Record | None = None  # of a file
     path: np.ndarray | None = None  # of centre and tail over a period, (2, 2, n_time)
     went: float = 0.0  # distance of the centre a period, mean over the record [body lengths]
+
+    @property
+    def centre(self) -> int:
+        """`colloc.gaits.record.Record.centre`."""
+        return self.record.centre if self.record else 0
 
     def describe(self) -> str:
         if not self.samples:
             return "the series as it was given"
         plural = "s" * (self.gait.n_harmonic > 1)
         rms, largest = (_format(a, self.degrees, ".1e") for a in (self.rms, self.largest))
-        text = f"{self.taken}; " if self.taken else ""
+        text = f"{self.record.taken}; " if self.record else ""
         if self.centre:
             text += f"all joints move about {self.centre}°, which servos may count from; "
         text += f"{self.gait.n_harmonic} harmonic{plural} through {self.samples} samples"
@@ -136,7 +140,7 @@ def fitted_gait(
     fitted = samples.gait(samples.best_fit(period, harmonics))
     if record is None:
         return fitted
-    fitted = replace(fitted, taken=record.taken, centre=record.centre)
+    fitted = replace(fitted, record=record)
     return fitted if record.path is None else _with_path(fitted, samples, record.path)
 
 

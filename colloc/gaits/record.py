@@ -52,10 +52,10 @@ class Record(NamedTuple):
     taken: str  # what was read, and what was left out, in one sentence without its full stop
     centre: int  # right angle about which servos are centred [degrees]; 0 if about none
     path: np.ndarray | None  # centre of mass and tail that markers tell, x and y, (2, 2, n_time)
-    rows: np.ndarray  # of the table that were taken, (n_time,)
+    others: list[tuple[Column, np.ndarray]]  # columns that are neither, and their numbers
 
 
-class _Column(NamedTuple):
+class Column(NamedTuple):
     at: int
     name: str
     words: tuple[str, ...] = ()  # letters and numbers of name and unit, in lower case
@@ -134,10 +134,10 @@ def read_record(
     angles -= 2 * np.pi * np.round(angles.mean(axis=1, keepdims=True) / (2 * np.pi))
     if turned := _names(joints, np.abs(angles - raw * units[:, None]).max(axis=1) > 1.0):
         notes.append(f"whole turns taken out of {turned}")
-    left = [c.name for c in columns if c.name and c not in [*clock, *joints]]
+    left = [c for c in columns if c.name and c not in [*clock, *joints]]
     if left:
         more = f" and {len(left) - 3} more" if len(left) > 3 else ""
-        notes.append(f"left out: {', '.join(left[:3])}{more}")
+        notes.append(f"left out: {', '.join(c.name for c in left[:3])}{more}")
     in_degrees = np.isclose(units, _DEGREE)
     mixed = f" (but {_names(joints, in_degrees)} degrees)" if in_degrees.any() else ""
     angle_unit = "degrees" if in_degrees.all() else f"radians{mixed}"
@@ -151,27 +151,27 @@ def read_record(
     right = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
     centred = n_joint > 1 and np.abs(centres - right).max() < _CENTRED
     centre = int(np.degrees(right).round()) if centred else 0
-    taken = "; ".join(facts)
+    taken, others = "; ".join(facts), [(c, table.values[rows, c.at]) for c in left]
     return Record(
-        time - time[0], angles, bool(in_degrees.all()), period, taken, centre, places, rows
+        time - time[0], angles, bool(in_degrees.all()), period, taken, centre, places, others
     )
 
 
-def _names(columns: list[_Column], which: np.ndarray) -> str:
+def _names(columns: list[Column], which: np.ndarray) -> str:
     return ", ".join(columns[j].name for j in np.flatnonzero(which))
 
 
-def _ends(columns: list[_Column]) -> str:
+def _ends(columns: list[Column]) -> str:
     return " ... ".join(dict.fromkeys((columns[0].name, columns[-1].name)))
 
 
 def _columns(
     path: Path, table: Table, n_joint: int, body: Chain | None
-) -> tuple[list[_Column], list[_Column], list[_Column], str]:
+) -> tuple[list[Column], list[Column], list[Column], str]:
     """All named columns; those of times, if any; those of the joints, and how they are known."""
     if not table.names:
         width = table.values.shape[1]
-        unnamed = [_Column(j, f"column {j + 1}") for j in range(width)]
+        unnamed = [Column(j, f"column {j + 1}") for j in range(width)]
         if width not in (n_joint, n_joint + 1):
             _refuse_count(path, width - 1, n_joint)
         clock, joints = unnamed[: width - n_joint], unnamed[width - n_joint :]
@@ -180,7 +180,7 @@ def _columns(
     for j, each in enumerate(zip(table.names, table.units, strict=True)):
         name = " ".join(each)
         spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
-        columns.append(_Column(j, name.strip(), tuple(re.findall(r"[^\W\d_]+|\d+|°", spaced))))
+        columns.append(Column(j, name.strip(), tuple(re.findall(r"[^\W\d_]+|\d+|°", spaced))))
     varies = [column for column in columns if len({row[column.at] for row in table.cells}) > 1]
     times = [column for column in varies if column.kind == "time"]
     whole, part = (
@@ -198,8 +198,8 @@ def _columns(
 
 
 def _joints(
-    path: Path, columns: list[_Column], n_joint: int, body: Chain | None
-) -> tuple[list[_Column], str]:
+    path: Path, columns: list[Column], n_joint: int, body: Chain | None
+) -> tuple[list[Column], str]:
     angles = [column for column in columns if column.kind == "angle"]
     places = [column for column in columns if column.kind == "place"]
     if not angles and places and body is not None:
@@ -216,7 +216,7 @@ def _joints(
     joints = [column for column in angles if not {*column.words} & HEADINGS or column.numbers]
     if len(angles) > n_joint <= len(joints):
         angles = joints
-    sets: dict[tuple[str, ...], list[_Column]] = {}
+    sets: dict[tuple[str, ...], list[Column]] = {}
     for column in angles:
         sets.setdefault(column.skeleton, []).append(column)
     same = len({column.skeleton[:-1] for column in angles}) == 1
@@ -251,7 +251,7 @@ def _joints(
     return angles, "in the file's order, tail to head,"
 
 
-def _markers(path: Path, columns: list[_Column], n_point: int) -> list[_Column]:
+def _markers(path: Path, columns: list[Column], n_point: int) -> list[Column]:
     """The columns x and y of all points, from tail to head."""
     sides = [
         sorted((c for c in columns if axis in c.words), key=lambda column: column.numbers)
@@ -302,7 +302,7 @@ def _refuse(path: Path, what: str) -> NoReturn:
     raise ProblemError(f"{path}: {what}: call columns of joints joint_1 (at the tail), joint_2 ...")
 
 
-def _times(path: Path, table: Table, clock: list[_Column]) -> tuple[np.ndarray, str]:
+def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, str]:
     """Times of all rows, and their unit in words."""
     if not clock:
         samples = np.arange(len(table.lines), dtype=float)
@@ -335,7 +335,7 @@ def _times(path: Path, table: Table, clock: list[_Column]) -> tuple[np.ndarray, 
 
 
 def _rows(
-    path: Path, table: Table, time: np.ndarray, clock: list[_Column], joints: list[_Column]
+    path: Path, table: Table, time: np.ndarray, clock: list[Column], joints: list[Column]
 ) -> tuple[np.ndarray, list[str]]:
     """Numbers of the rows that are samples, and notes on the others."""
     needed = [column.at for column in (*clock[:1], *joints)]
@@ -378,7 +378,7 @@ def _even_steps(time: np.ndarray) -> tuple[np.ndarray, str]:
     return line, f", stamps rounded to {unit:.3g} taken as equal steps of {step:.4g}"
 
 
-def _units(path: Path, table: Table, joints: list[_Column], degrees: bool) -> np.ndarray:
+def _units(path: Path, table: Table, joints: list[Column], degrees: bool) -> np.ndarray:
     """Radians per unit of each joint's column ``(n_joint,)``."""
     stated = []
     for column in joints:
@@ -404,7 +404,7 @@ def _units(path: Path, table: Table, joints: list[_Column], degrees: bool) -> np
 
 
 def _check_size_of_angles(
-    path: Path, joints: list[_Column], raw: np.ndarray, units: np.ndarray
+    path: Path, joints: list[Column], raw: np.ndarray, units: np.ndarray
 ) -> None:
     """Raise a `ProblemError` for numbers ``(n_joint, n_time)`` too large for their unit."""
     largest = np.abs(raw).max(axis=1)

@@ -1,7 +1,8 @@
 """A planar serial chain out of a model of a robot, URDF or MJCF, as `Chain` counts it.
 
 In the posture that the file calls zero the joints lie on a line. What is fixed together is one
-link. Free hinges across with nothing behind them are wheels, slides with a spring feet.
+link. Free hinges across with nothing behind them are wheels, slides with a spring feet. A URDF is
+read as the MJCF that says the same.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.etree.ElementTree import Element, ParseError, fromstring
+from xml.etree.ElementTree import Element, ParseError, SubElement, fromstring
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,9 +22,24 @@ from colloc.system.errors import ProblemError
 _SMALL = 1e-3  # sine of an angle, or part of the length, that counts as none
 _OFF = 0.05  # distance of a link's mass from its middle that is spoken of, over its length
 _ROLLS = 0.5  # friction along over that across, below which a contact is a wheel
-_FOOT = "sprung slide"  # kind of joint of what presses on the floor
 _LINE = 16  # Gauss points of a pad in MJCF
-_RARE = "include replicate attach frame *[@xyaxes] *[@zaxis] *[@axisangle] *[@eulerseq]"
+_RARE = "include replicate attach frame *[@xyaxes] *[@zaxis] *[@axisangle]"
+_UNREAD = {
+    "moments of inertia (links count as uniform rods)": "inertia *[@diaginertia] *[@fullinertia]",
+    "friction and damping of joints": "dynamics *[@damping] *[@frictionloss]",
+    "couplings of joints": "mimic equality",
+    "friction of Gazebo": "mu1 mu2",
+}
+"""What is said not to be taken, and the elements that have it."""
+
+
+_NAMES = {
+    "origin": {"xyz": "pos", "rpy": "euler"},
+    "axis": {"xyz": "axis"},
+    "mass": {"value": "mass"},
+    "limit": {"lower": "lower", "upper": "upper", "velocity": "speed", "effort": "torque"},
+}
+"""Elements of a URDF, and attributes of MJCF by theirs."""
 
 
 class Model(NamedTuple):
@@ -36,6 +52,7 @@ class Model(NamedTuple):
     max_torque: list[float]
     joints: str  # the file's angles by colloc's
     feet: list[str]  # as Python
+    mu: float | None  # the coefficient of friction, if there is one of all parts
     notes: list[str]
 
 
@@ -47,29 +64,18 @@ class _Part:
     parent: _Part | None = None
     joint: str = ""
     kind: str = "hinge"
+    sprung: bool = False
     place: Any = 0.0  # of its joint
     axis: Any = 0.0
     turn: Any = 0.0
     limit: tuple[float, float] | None = None
     speed: float = 0.0
     torque: float = 0.0
-    friction: Any = (1.0, 1.0)  # along its x and across
+    friction: list[tuple[float, float]] = field(default_factory=list)  # along its x and across
     mass: float = 0.0
     moment: Any = 0.0  # sum of mass times place
     solids: list[tuple[np.ndarray, np.ndarray, int]] = field(default_factory=list)
     """Middle, half axes as columns, and the norm that tells how far they reach: 1 of a box."""
-
-    def weigh(self, mass: np.ndarray, place: np.ndarray) -> None:
-        self.mass, self.moment = self.mass + float(mass[0]), self.moment + mass * place
-
-    def solid(self, kind: str, size: np.ndarray, place: np.ndarray, turn: np.ndarray) -> None:
-        """Take in a box of half its edges, or a radius and half a length along z."""
-        if kind == "box":
-            self.solids.append((place, turn * size, 1))
-        elif kind in ("sphere", "cylinder", "capsule"):
-            r, h = (*size, 0.0, 0.0)[:2]
-            z = {"sphere": r, "cylinder": h}.get(kind, r + h)
-            self.solids.append((place, turn * [r, r, z], 2))
 
 
 def read_model(path: Path) -> Model:
@@ -84,9 +90,15 @@ def read_model(path: Path) -> Model:
             raise ProblemError("it is a xacro: write `xacro FILE > robot.urdf` first.")
         if root.tag not in ("robot", "mujoco"):
             raise ProblemError(f"<{root.tag}> is neither a URDF (<robot>) nor an MJCF (<mujoco>).")
-        return _chain(_urdf(root) if root.tag == "robot" else _mjcf(root))
+        model = _chain(_parts(_as_mjcf(root) if root.tag == "robot" else root))
     except (ProblemError, ValueError) as error:
         raise ProblemError(f"{path}: {error}") from None
+    unread = [what for what, tags in _UNREAD.items() if _first(root, tags)]
+    return model._replace(notes=model.notes + [f"not taken: {', '.join(unread)}"] * bool(unread))
+
+
+def _first(root: Element, tags: str) -> str:
+    return next((tag for tag in tags.split() if root.find(f".//{tag}") is not None), "")
 
 
 def _row(element: Element | None, name: str, default: str, of: str) -> np.ndarray:
@@ -101,69 +113,60 @@ def _row(element: Element | None, name: str, default: str, of: str) -> np.ndarra
     return row
 
 
-def _urdf(root: Element) -> list[_Part]:
-    links = {link.get("name", ""): link for link in root.findall("link")}
-    carried: dict[Any, list[tuple[Element, Any]]] = {name: [] for name in links}
+def _as_mjcf(root: Element) -> Element:
+    """A URDF as MJCF; spheres of collision under another shape are feet."""
+    for each in root.iter():
+        for tag, names in _NAMES.items():
+            for says in each.findall(tag)[:1]:
+                each.attrib |= {names[x]: y for x, y in says.items() if x in names}
+    links, behind = {link.get("name"): link for link in root.findall("link")}, []
     for joint in root.findall("joint"):
         ends = [getattr(joint.find(x), "attrib", {}).get("link") for x in ("parent", "child")]
         if not {*ends} <= {*links}:
             raise ProblemError(f'joint "{joint.get("name")}" names a link that is not there.')
-        carried[ends[0]].append((joint, ends[1]))
-    behind = [child for joints in carried.values() for _, child in joints]
-    tops = [name for name in links if name not in behind]
+        parent, child = (links[x] for x in ends)
+        behind.append(child)
+        child.attrib |= {x: joint.attrib.pop(x, "0 0 0") for x in ("pos", "euler")}
+        parent.append(child)
+        kind, low, high = (joint.get(x, "0") for x in ("type", "lower", "upper"))
+        joint.attrib |= {"range": f"{low} {high}", "axis": joint.get("axis", "1 0 0")}
+        joint.attrib |= {"limited": str(kind == "revolute").lower()}
+        if kind in ("revolute", "continuous"):
+            joint.set("type", "hinge")
+        if kind != "fixed":
+            child.append(joint)
+    tops = [link for link in links.values() if link not in behind]
     if len(tops) != 1 or len({*behind}) < len(behind):
         raise ProblemError("its joints must lead from one link to every other one, on one way.")
-    parts = [_Part(tops[0])]
-
-    def frame_of(element: Element, frame: Any, of: str) -> Any:
-        (place, turn), origin = frame, element.find("origin")
-        own = Rotation.from_euler("xyz", _row(origin, "rpy", "0 0 0", of)).as_matrix()
-        return place + turn @ _row(origin, "xyz", "0 0 0", of), turn @ own
-
-    def grow(name: str, part: _Part, frame: Any) -> None:
-        link, of = links[name], f'link "{name}"'
-        for each in link.findall("inertial"):
-            part.weigh(_row(each.find("mass"), "value", "0", of), frame_of(each, frame, of)[0])
-        kinds = []
+    for name, link in links.items():
+        link.tag, kinds = "body", []
         for use in ("visual", "collision"):
             shapes = [(x, y) for x in link.findall(use) for y in x.findall("geometry/*")]
             kinds.append({shape.tag for _, shape in shapes})
             for each, shape in shapes:
-                size = 0.5 * _row(shape, "size", "0 0 0", of)
+                size = _row(shape, "size", "0 0 0", of := f'link "{name}"')
                 if shape.tag != "box":
                     r, length = (_row(shape, x, "0", of) for x in ("radius", "length"))
-                    size = np.append(r, 0.5 * length)
-                part.solid(shape.tag, size, *frame_of(each, frame, of))
+                    size = np.append(2 * r, length)
+                stated = {"type": shape.tag, "size": " ".join(map(str, (0.5 * size).tolist()))}
+                SubElement(link, "geom", each.attrib | stated, contype="0", conaffinity="0")
                 if use == "collision" and kinds[1] == {"sphere"} < kinds[0] | {"sphere"}:
-                    middle = frame_of(each, frame, of)[0]  # of a sphere under something else
-                    parts.append(_Part("", part, "", _FOOT, middle, np.eye(3)[2]))
-        for joint, child in carried[name]:
-            kind, of = joint.get("type", ""), f'joint "{joint.get("name")}"'
-            where, axes = own = frame_of(joint, frame, of)
-            if kind == "fixed":
-                grow(child, part, own)
-                continue
-            parts.append(other := _Part(child, part, joint.get("name", ""), kind, where))
-            other.axis = axes @ _row(joint.find("axis"), "xyz", "1 0 0", of)
-            low, high, other.speed, other.torque = (
-                float(_row(joint.find("limit"), x, "0", of)[0])
-                for x in ("lower", "upper", "velocity", "effort")
-            )
-            if kind in ("revolute", "continuous"):
-                other.kind, other.limit = "hinge", (low, high) if kind == "revolute" else None
-            grow(child, other, own)
-
-    grow(tops[0], parts[0], (np.zeros(3), np.eye(3)))
-    return parts
+                    foot = SubElement(link, "body", each.attrib)
+                    SubElement(foot, "joint", type="slide", stiffness="1")
+    model = Element("mujoco")
+    SubElement(model, "compiler", angle="radian", eulerseq="XYZ")
+    SubElement(model, "worldbody").append(tops[0])
+    return model
 
 
-def _mjcf(root: Element) -> list[_Part]:
-    for rare in _RARE.split():
-        if root.find(f".//{rare}") is not None:
-            raise ProblemError(
-                f"{rare} is not read: load it in MuJoCo and save it with mj_saveLastXML first."
-            )
-    unit = math.pi / 180 if root.find("compiler[@angle='radian']") is None else 1.0
+def _parts(root: Element) -> list[_Part]:
+    if rare := _first(root, _RARE):
+        raise ProblemError(
+            f"{rare} is not read: load it in MuJoCo and save it with mj_saveLastXML first."
+        )
+    compiler = {name: x for each in root.findall("compiler") for name, x in each.items()}
+    unit = 1.0 if compiler.get("angle") == "radian" else math.pi / 180
+    order = compiler.get("eulerseq", "xyz").swapcase()  # capitals turn with the body in SciPy
     classes: dict[str, dict[str, dict[str, str]]] = {}
     pairs = {x.get("geom2"): x for x in root.findall("contact/pair")}
     parts: list[_Part] = []
@@ -177,53 +180,75 @@ def _mjcf(root: Element) -> list[_Part]:
     for default in root.findall("default"):
         inherit(default, {})
 
+    def elements(body: Element, tag: str, usual: str) -> list[Element]:
+        each = [(classes.get(x.get("class", usual), {}), x) for x in body.findall(tag)]
+        return [Element(tag, names.get(tag, {}) | x.attrib) for names, x in each]
+
+    def friction_of(element: Element, of: str) -> tuple[float, float]:
+        row = _row(element, "friction", "", of) if element.get("friction") else np.ones(1)
+        along, across = np.resize(row[:2], 2).tolist()
+        return along, across
+
     def frame_of(element: Element, frame: Any, of: str) -> Any:
         place, turn = frame
         own = Rotation.from_quat(np.roll(_row(element, "quat", "1 0 0 0", of), -1))
         if element.get("euler"):
-            own = Rotation.from_euler("XYZ", unit * _row(element, "euler", "0 0 0", of))
+            own = Rotation.from_euler(order, unit * _row(element, "euler", "0 0 0", of))
         return place + turn @ _row(element, "pos", "0 0 0", of), turn @ own.as_matrix()
 
     def grow(body: Element, part: _Part | None, usual: str, above: Any) -> None:
-        usual, of = body.get("childclass", usual), f'body "{body.get("name")}"'
+        usual, of = body.get("childclass", usual), f'"{body.get("name")}"'
         place, turn = frame = frame_of(body, above, of)
-
-        def elements(tag: str) -> list[Element]:
-            table = [classes.get(x.get("class", usual), {}) for x in body.findall(tag)]
-            both = zip(table, body.findall(tag), strict=True)
-            return [Element(tag, names.get(tag, {}) | x.attrib) for names, x in both]
-
-        joints = elements("joint") if part else []  # of the first body they place it in the world
+        # joints of the first body place it in the world
+        joints = elements(body, "joint", usual) if part else []
         part = part or _Part(body.get("name", ""))
-        for joint in joints:
-            kind = joint.get("type", "hinge")
-            kind = _FOOT if kind == "slide" and joint.get("stiffness") else kind
-            part = _Part(body.get("name", ""), part, joint.get("name", ""), kind, turn=turn)
-            part.place = place + turn @ _row(joint, "pos", "0 0 0", of)
-            part.axis = turn @ _row(joint, "axis", "0 0 1", of)
-            low, high = unit * _row(joint, "range", "0 0", of) - unit * _row(joint, "ref", "0", of)
-            part.limit = (low, high) if low < high and joint.get("limited") != "false" else None
         if len(joints) > 1:
             raise ProblemError(f"{of} has {len(joints)} joints: a chain has one between two links.")
+        for joint in joints:
+            part = _Part(body.get("name", ""), part, joint.get("name", ""), turn=turn)
+            part.kind, part.sprung = joint.get("type", "hinge"), bool(joint.get("stiffness"))
+            part.place = place + turn @ _row(joint, "pos", "0 0 0", of)
+            axis = turn @ _row(joint, "axis", "0 0 1", of)
+            part.axis = axis / (float(np.linalg.norm(axis)) or 1.0)
+            low, high = unit * _row(joint, "range", "0 0", of) - unit * _row(joint, "ref", "0", of)
+            limited = joint.get("limited", "true" if low < high else "false")
+            if limited == "true" or (limited == "auto" and low < high):
+                part.limit = (low, high)
+            part.speed, part.torque = (
+                float(_row(joint, x, "0", of)[0]) for x in ("speed", "torque")
+            )
         if part not in parts:
             parts.append(part)
-        for each in (inertial := elements("inertial")):
-            part.weigh(_row(each, "mass", "0", of), frame_of(each, frame, of)[0])
-        for geom in elements("geom"):
+        inertials = elements(body, "inertial", usual)
+        weights = [(each, frame_of(each, frame, of)[0]) for each in inertials]
+        for geom in elements(body, "geom", usual):
+            kind, name = geom.get("type", "sphere"), geom.get("name")
             size, (middle, axes) = _row(geom, "size", "", of), frame_of(geom, frame, of)
             if geom.get("fromto"):
                 ends = _row(geom, "fromto", "0 0 0 0 0 1", of).reshape(2, 3) @ turn.T
                 middle, half = place + ends.mean(axis=0), 0.5 * (ends[1] - ends[0])
                 axes = Rotation.align_vectors([half], [[0, 0, 1]])[0].as_matrix()
                 size = np.append(size[:1], np.linalg.norm(half))
-            part.solid(geom.get("type", "sphere"), size, middle, axes)
-            if not inertial:
-                part.weigh(_row(geom, "mass", "0", of), middle)
-            if (pair := pairs.get(geom.get("name"))) is not None:
-                part.friction = np.resize(_row(pair, "friction", "", of)[:2], 2)
+            if kind == "box":
+                part.solids.append((middle, axes * size, 1))
+            elif kind in ("sphere", "cylinder", "capsule"):
+                r, h = (*size, 0.0, 0.0)[:2]
+                z = {"sphere": r, "cylinder": h}.get(kind, r + h)
+                part.solids.append((middle, axes * [r, r, z], 2))
+            if name in pairs:
+                part.friction.append(friction_of(pairs[name], of))
+            elif {geom.get("contype"), geom.get("conaffinity")} != {"0"}:
+                part.friction.append(max(friction_of(geom, of)[:1] * 2, floor))
+            weights.append((geom, middle))
+        for each, middle in weights[: len(inertials) or None]:
+            mass = float(_row(each, "mass", "0", of)[0])
+            part.mass, part.moment = part.mass + mass, part.moment + mass * middle
         for each in body.findall("body"):
             grow(each, part, usual, frame)
 
+    world = root.find("worldbody") or root
+    ground = [friction_of(x, "floor")[:1] * 2 for x in elements(world, "geom", "main")]
+    floor = max(ground, default=(1.0, 1.0))  # two that touch have the larger coefficient
     bodies = [x for x in root.findall("worldbody/body") if x.find(".//body/joint") is not None]
     if len(bodies) != 1:
         raise ProblemError(f"{len(bodies)} bodies of its world have joints in them: one must.")
@@ -238,13 +263,13 @@ def _chain(parts: list[_Part]) -> Model:
     if not known:
         raise ProblemError("no joint of it turns: a chain has hinges between its links.")
     first = max(known, key=lambda part: known[part])
-    up = first.axis / (float(np.linalg.norm(first.axis)) or 1.0)
-    up = -up if up[2] < -_SMALL else up
+    up = -first.axis if first.axis[2] < -_SMALL else first.axis
     stand = []
     for part in parts[1:]:
-        cos = abs(float(part.axis @ up)) / (float(np.linalg.norm(part.axis)) or 1.0)
+        cos = abs(float(part.axis @ up))
         what, cure = f'joint "{part.joint}"', "fix it in the file if the robot can hold it"
-        if (part.kind == _FOOT and not carried[part]) or (known.get(part) == 0 and cos < _SMALL):
+        is_foot = part.kind == "slide" and part.sprung and not carried[part]
+        if is_foot or (known.get(part) == 0 and cos < _SMALL):
             stand.append(part)
         elif part not in known:
             raise ProblemError(f"{what} is {part.kind}: a chain has hinges alone; {cure}.")
@@ -260,22 +285,18 @@ def _chain(parts: list[_Part]) -> Model:
                 f'link "{part.name}" carries joints {", ".join(x.joint for x in on)}: a chain has '
                 f"no branches; take all but one away, or fix them."
             )
-    links = parts[:1]
-    for each in carried[parts[0]]:
-        arm = [each]
-        while arm:
-            links += arm
-            arm = carried[arm[0]]
-        links.reverse()  # an arm is followed from its end
-    links = links if len(carried[parts[0]]) > 1 else links[::-1]
+
+    def arm(part: _Part) -> list[_Part]:
+        return [part, *(y for x in carried[part] for y in arm(x))]
+
+    arms = [arm(x) for x in carried[parts[0]]]
+    links = [*(x for each in arms[1:] for x in each[::-1]), parts[0], *arms[0]]
     ends = links[0].name.lower(), links[-1].name.lower()
     if any(x in ends[0] for x in ("head", "front")) or any(x in ends[1] for x in ("tail", "rear")):
         links.reverse()
     joints = [b if b.parent is a else a for a, b in pairwise(links)]
-    signs = [
-        math.copysign(1, x.axis @ up) * (1 if x is b else -1)
-        for x, b in zip(joints, links[1:], strict=True)
-    ]
+    turns = zip(joints, links[1:], strict=True)
+    signs = [math.copysign(1, x.axis @ up) * (1 if x is b else -1) for x, b in turns]
     places = np.array([part.place for part in joints]) @ (np.eye(3) - np.outer(up, up))
     span = float(np.linalg.norm(places[-1] - places[0]))
     ahead = (places[-1] - places[0]) / (span or 1.0)
@@ -318,11 +339,11 @@ def _chain(parts: list[_Part]) -> Model:
                 f"between."
             )
         limits.append((max(low, -math.pi), min(high, math.pi)))
-    feet, nodes = list[str](), np.polynomial.legendre.leggauss(_LINE)[0]
+    feet, directed, nodes = list[str](), list[_Part](), np.polynomial.legendre.leggauss(_LINE)[0]
     for k, part in enumerate(links):
         rows = []
         for x in (y for y in stand if y.parent is part):
-            kind, (along, across) = "Foot", x.friction
+            kind, (along, across) = "Foot", (x.friction or [(1.0, 1.0)])[-1]
             offset = (x.place - places[0]) @ left / lengths.sum()
             more = f", offset={offset:.6g}" if abs(offset) > 1e-6 else ""
             if x in wheels or along < _ROLLS * across:
@@ -331,6 +352,7 @@ def _chain(parts: list[_Part]) -> Model:
                 more += f", angle={angle:.6g}" if abs(angle) > _SMALL else ""
                 own = f"rolling={along:g}, sideways={across:g}"
                 more += ", sideways={mu:g}" if x in wheels else f", {own}"
+                directed += [x] if x not in wheels else []
             place = (x.place @ ahead - at[k]) / lengths[k]
             rows.append((round(float(place), 6) + 0.0, kind, more))
         rows.sort()
@@ -345,17 +367,23 @@ def _chain(parts: list[_Part]) -> Model:
         feet += [f"{kind}({k}, {place:g}{more})" for place, kind, more in rows]
     if all(foot.endswith(", 0.0000, 1.0000)") for foot in feet):
         feet = []
-    speeds, torques = ([getattr(x, name) for x in joints] for name in ("speed", "torque"))
+    mus = {mu for part in parts for each in part.friction if part not in directed for mu in each}
+    if len(mus) > 1:
+        notes.append(
+            f"its coefficients of friction, from {min(mus):g} to {max(mus):g}, are not taken: "
+            f"state --mu"
+        )
+    motors = ([getattr(x, name) for x in joints] for name in ("speed", "torque"))
+    speeds, torques = (most if min(most) > 0 else [] for most in motors)
+    names = [f"{x.joint} = {'-' * (y < 0)}joint_" for x, y in zip(joints, signs, strict=True)]
     return Model(
         [round(float(x), 9) for x in lengths],
         [round(x, 9) for x in masses],
         limits,
-        speeds if min(speeds) > 0 else [],
-        torques if min(torques) > 0 else [],
-        ", ".join(
-            f"{part.joint} = {'-' * (sign < 0)}joint_{j}"
-            for j, (part, sign) in enumerate(zip(joints, signs, strict=True), 1)
-        ),
+        speeds,
+        torques,
+        ", ".join(f"{name}{j}" for j, name in enumerate(names, 1)),
         feet,
+        mus.pop() if len(mus) == 1 else None,
         notes,
     )

@@ -96,9 +96,8 @@ def evaluate(
         body=problem.body if isinstance(problem.body, Chain) and not problem.joint_map else None,
     )
     series = fitted.gait
-    if (
-        fitted.centre
-    ):  # servo angles about a right angle: all joints bent alike, and links that cross
+    # servo angles about a right angle: all joints bent alike, and links that cross
+    if fitted.centre:
         angles, _ = problem.joint_path(*series(np.arange(256) / 256))
         if float(crossing_depth(problem.body, angles).max()) > TOLERANCES.kkt:
             raise ProblemError(
@@ -110,21 +109,13 @@ def evaluate(
             "a gait is evaluated at one pace, by an objective that does not speak of the period: "
             "state froude=0.05 (a robot: one period), and such an objective."
         )
-    gait_class: AnyClass = Harmonic(series.n_harmonic)
-    driven: AnyGait = series
-    if isinstance(problem.gait, Coupled):
-        gait_class = replace(problem.gait, gait=gait_class)
-        driven = gait_class.driven_by(series, problem.body.n_joint)
-    length, least = 2 * math.pi * driven.shape_speed, problem.smallest_shape_speed
-    if driven.shape_speed < least:
+    stated, driven = with_motors(problem, series)
+    if driven.shape_speed < (least := problem.smallest_shape_speed):
         raise ProblemError(
             f"the gait hardly moves: its shape speed {driven.shape_speed:.3g} is below "
             f"smallest_shape_speed {least:g}, where friction is viscous."
         )
-    delta = problem.delta * (length if problem.gait.relative_delta else 1.0)
-    usual = {"guess": None, "delta_start": None, "intervals": None}
-    stated = problem.with_(gait=gait_class, rotation=None, delta=delta, **usual)
-    answer = _answer(stated, driven)
+    answer = on_fine_mesh(stated, driven)
     turned = answer.motion.rotation
     if abs(turned) < TOLERANCES.replay_gap * answer.distance:
         if not problem.uses("rotation"):  # which then may be anything
@@ -132,7 +123,7 @@ def evaluate(
             answer = replace(answer, problem=stated)
     else:  # how far it goes is then the chord of its arc
         stated = stated.with_(rotation=turned)
-        answer = _answer(stated, driven)
+        answer = on_fine_mesh(stated, driven)
     certificate, said = UNCERTIFIED, ""
     if goes_nowhere(answer):
         said = " It goes nowhere for its work, so there is no value to certify: is it one that "
@@ -166,18 +157,33 @@ def evaluate(
     return solution
 
 
-def _answer(problem: Problem, gait: AnyGait) -> Answer:
+def with_motors(problem: Problem, motors: Fourier) -> tuple[Problem, AnyGait]:
+    """The problem of series of as many harmonics, and the gait there of such motors."""
+    gait_class: AnyClass = Harmonic(motors.n_harmonic)
+    gait: AnyGait = motors
+    if isinstance(problem.gait, Coupled):
+        gait_class = replace(problem.gait, gait=gait_class)
+        gait = gait_class.driven_by(motors, problem.body.n_joint)
+    delta = problem.delta * (2 * math.pi * gait.shape_speed if problem.gait.relative_delta else 1.0)
+    usual = {"guess": None, "delta_start": None, "intervals": None}
+    return problem.with_(gait=gait_class, rotation=None, delta=delta, **usual), gait
+
+
+def on_mesh(problem: Problem, gait: AnyGait, mesh: Mesh) -> Answer:
+    """The motion of a gait on a mesh."""
+    control = control_problem(problem)
+    parameters = control.admissible.parameters(gait)
+    space = SearchSpace(control, mesh.edges, mesh.scheme.name, full=parameters)
+    answer = answer_of_iterate(evaluate_at(space, np.empty(0), problem.delta))
+    return replace(answer, status=EVALUATED, program=EVALUATED)
+
+
+def on_fine_mesh(problem: Problem, gait: AnyGait) -> Answer:
     """The gait on a mesh that meets the problem's tolerance; on a first mesh if it goes nowhere."""
     begin, control = time.perf_counter(), control_problem(problem)
-    parameters = control.admissible.parameters(gait)
-
-    def on(mesh: Mesh) -> Answer:
-        space = SearchSpace(control, mesh.edges, mesh.scheme.name, full=parameters)
-        answer = answer_of_iterate(evaluate_at(space, np.empty(0), problem.delta))
-        return replace(answer, status=EVALUATED, program=EVALUATED)
-
-    member, mesh, message = control.admissible.member(parameters), control.mesh(), ""
-    first, answer = mesh, on(mesh)
+    member = control.admissible.member(control.admissible.parameters(gait))
+    mesh, message = control.mesh(), ""
+    first, answer = mesh, on_mesh(problem, gait, mesh)
     meshes = OPTIONS.meshes if problem.mesh_tolerance > 0 and not goes_nowhere(answer) else 0
     for _ in range(meshes):
         plan = plan_mesh(control, mesh, member, problem.delta, problem.mesh_tolerance)
@@ -186,7 +192,7 @@ def _answer(problem: Problem, gait: AnyGait) -> Answer:
         mesh = Mesh(scheme(plan.scheme), plan.edges)
         message = "" if plan.reached else f"the mesh is accurate to {plan.estimate:.0e} only."
     if mesh is not first:
-        answer = on(mesh)
+        answer = on_mesh(problem, gait, mesh)
     answer = replace(answer, message=message, seconds=time.perf_counter() - begin)
     return replace(answer, history=(answer.step,))
 

@@ -1,7 +1,7 @@
 """Friction from motion: the coefficients under which a body whose joint angles were measured goes
 the measured way.
 
-The joint angles are fitted (`colloc.gaits.fitted_gait`) and the motion integrated; origin and
+The joint angles are fitted (`colloc.gaits.fitted_gait`) and the motion solved for; origin and
 direction of the measured axes follow in closed form. What is left is least squares on logarithms x
 of the coefficients over the stated ones. Errors are those of the residuals, as many as are
 independent, and of the samples of the joint angles.
@@ -11,34 +11,29 @@ from __future__ import annotations
 
 import math
 import os
-import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
-from colloc.gaits.coupled import Coupled
 from colloc.gaits.fitted_gait import COVERED, Uncertainty, correlation_time, fitted_gait
-from colloc.gaits.gait import delta_per_period
-from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.harmonic import Fourier, Harmonic
+from colloc.gaits.harmonic import Fourier
+from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.parameters import COEFFICIENTS, parameters
 from colloc.gaits.problem import Problem
-from colloc.gaits.record import FEWEST, HEADINGS, read_record
+from colloc.gaits.record import FEWEST, HEADINGS, Record
 from colloc.mechanics.chain import Chain
-from colloc.results.motion import RigidMotion
+from colloc.results.motion import lab_outline
+from colloc.search.evaluate import on_fine_mesh, on_mesh, with_motors
 from colloc.smooth.prescribed_body import schedule
 from colloc.system.arguments import check_finite
-from colloc.system.csv_table import read_table
 from colloc.system.errors import ProblemError
-from colloc.verification.adaptive_motion import fine_motion
-from colloc.verification.differential_motion import GaitWithInertia
 
 _UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180, "°": np.pi / 180}
-_POINTS = {"head": "head", "tail": "tail", "centre": "centre", "center": "centre"}
+_POINTS = {"tail": 0, "centre": 1, "center": 1, "head": 2}
 _ACCURACY = 1e-5  # of the motion [body lengths]
 _STEP = 1e-3  # of x in differences
 _VAGUE, _HELD = 3.0, 1e-2
@@ -53,7 +48,7 @@ _PART = 0.3  # of the largest change, that is named
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """Friction found from a motion."""
+    """Friction identified from a motion."""
 
     problem: Problem = field(repr=False)  # with this friction
     coefficients: dict[str, tuple[float, float]]
@@ -155,130 +150,117 @@ def identify(
     length = length or getattr(problem.robot, "length", None)
     if length is not None:
         check_finite(positive=True, length=length)
-    path, n_motor, body = Path(record), problem.n_motor, problem.body
-    how: Any = {"degrees": degrees, "body": None}
-    if isinstance(body, Chain) and not problem.joint_map:  # whose angles markers may tell
-        how["body"] = body
-    fitted = fitted_gait(path, n_motor, period=period, harmonics=harmonics, **how)
-    read = read_record(path, n_motor, **how)
-    if read.path is None:
-        way = _read_way(path, read.rows, length)
-    else:
-        places = read.path[:, 0] + 1j * read.path[:, 1]
-        way = _Way(["centre", "tail"], places, [], np.empty((0, read.time.size)))
-    fit = _Fit(problem.without_robot, way, fitted.gait, read.time / fitted.period)
+    how: Any = {"period": period, "harmonics": harmonics, "degrees": degrees}
+    if isinstance(problem.body, Chain) and not problem.joint_map:
+        how["body"] = problem.body  # whose angles markers may tell
+    fitted = fitted_gait(path := Path(record), problem.n_motor, **how)
+    read: Any = fitted.record
+    measured = _measured(path, read, length)
+    fit = _Fit(problem.without_robot, measured, fitted.gait, read.time / fitted.period)
     if mu_forward is not None:
         check_finite(positive=True, mu_forward=mu_forward)
         if not fit.only_ratios:
             raise ProblemError(
                 "with inertia the motion tells all coefficients: leave mu_forward out."
             )
-        fit.stated = fit.stated * (mu_forward / fit.stated[fit.forward])
+        fit.stated *= mu_forward / fit.stated[fit.forward]
     x = np.zeros(len(fit.free))
-    before = fit.rms(x)
+    before = fit.rms(fit.off(x))
     for _ in range(2):  # then with the noise of places and of headings
         x = fit.best(x)
     alike, covariance = fit.covariance(x, fitted.uncertainty)
-    squares, directions = np.linalg.eigh(covariance) if x.size else (np.empty(0), np.empty((0, 0)))
+    squares, directions = np.linalg.eigh(covariance) if x.size else (x, covariance)
     untold = directions.T[squares > _UNTOLD**2]
     if untold.size:
         fit.prior = np.vstack([fit.prior, untold / _HELD])
         x = fit.best(0 * x)
-    freedom, errors = max(fit.freedom / alike, 1.0), np.zeros(len(fit.names))
-    deviations = np.sqrt(np.diag(covariance))
+    deviations, errors = np.sqrt(np.diag(covariance)), np.zeros(len(fit.names))
     errors[fit.free] = np.where(deviations < _UNTOLD, deviations, np.inf)
-    values, after = fit.values(x), fit.rms(x)
-    remarks = [fit.say(direction) for direction in untold]
+    values, after = fit.values(x), fit.rms(fit.off(x))
+    errors *= values * float(stdtrit(max(fit.freedom / alike, 1.0), COVERED))
+    remarks = [fit.describe(direction) for direction in untold]
     if fit.only_ratios:
         remarks.append(
             f"Slow motion tells ratios alone: one factor of all coefficients, here by "
             f"{fit.names[fit.forward]} as stated, changes only torques and work."
         )
-    extent = float(np.nanstd(way.places if way.points else way.headings))
-    if after > _MISSED * extent and alike > _ALIKE:
+    if after > _MISSED * fit.extent and alike > _ALIKE:
         remarks.append(
             "No coefficients lead there: are lengths, order and signs of joints, and the side of y "
             "right?"
         )
-    errors *= values * float(stdtrit(freedom, COVERED))
-    found = zip(fit.names, zip(values.tolist(), errors.tolist(), strict=True), strict=True)
-    message = f"{fitted.describe()}; path of {', '.join(way.points) or 'headings'}"
+    points = [name for name, k in _POINTS.items() if fit.seen[0, k].any() and name != "center"]
     unit = f"of {length:g} m" if length else "lengths"
-    message += f" in body {unit}"
-    return Identified(fit.with_(x, 5), dict(found), before, after, tuple(remarks), message)
+    message = f"{fitted.describe()}; path of {', '.join(points) or 'headings'} in body {unit}"
+    both = zip(values.tolist(), errors.tolist(), strict=True)
+    coefficients = dict(zip(fit.names, both, strict=True))
+    return Identified(fit.with_(x, 5), coefficients, before, after, tuple(remarks), message)
 
 
-class _Way(NamedTuple):
-    """Measured places ``(n_point, n)`` (complex) and directions ``(n_heading, n)``; NaN if
-    blank."""
-
-    points: list[str]
-    places: np.ndarray
-    ends: list[str]
-    headings: np.ndarray
-
-
-def _read_way(path: Path, rows: np.ndarray, length: float | None) -> _Way:
-    table = read_table(path)
-    found: dict[tuple[str, str], np.ndarray] = {}
-    for k, each in enumerate(zip(table.names, table.units, strict=True)):
-        words = re.findall(r"[^\W\d_]+|\d+|°", " ".join(each).lower())
-        what = next((word for word in words if word in {"x", "y", *HEADINGS}), "")
-        if not what or {*words} - {what, "pos", "position", *_UNITS, *_POINTS}:
+def _measured(path: Path, record: Record, length: float | None) -> np.ndarray:
+    """Measured places of tail, centre and head, and directions there, ``(2, 3, n_time)``, both
+    complex; NaN where there is none."""
+    table = np.full((3, 3, record.time.size), np.nan)  # x, y, angle; of each
+    if record.path is not None:  # of centre and tail
+        table[:2, [1, 0]] = record.path.transpose(1, 0, 2)
+    for column, row in record.others if record.path is None else ():
+        words = {*column.words}
+        what = next((word for word in column.words if word in {"x", "y", *HEADINGS}), "")
+        if not what or words - {what, "pos", "position", *_UNITS, *_POINTS}:
             continue
-        unit = next((word for word in words if word in _UNITS), "")
-        point = next((_POINTS[word] for word in words if word in _POINTS), "")
-        scale = _UNITS.get(unit, 1.0)
-        if what in HEADINGS:
-            found[point or "tail", "theta"] = np.unwrap(scale * table.values[rows, k])
-        elif unit and length is None:
+        unit, is_place = next(iter(words & {*_UNITS}), ""), what in "xy"
+        if is_place and unit and length is None:
             raise ProblemError(
-                f"{path}: {table.names[k]} is in {unit}: give the length of the body [m]."
+                f"{path}: {column.name} is in {unit}: give the length of the body [m]."
             )
-        else:
-            found[point or "centre", what] = scale / (length or 1.0) * table.values[rows, k]
-    points = [point for point, what in found if what == "x" and (point, "y") in found]
-    ends = [point for point, what in found if what == "theta"]
-    both = [found[point, "x"] + 1j * found[point, "y"] for point in points]
-    places = np.array(both, dtype=complex).reshape(-1, rows.size)
-    headings = np.array([found[end, "theta"] for end in ends]).reshape(-1, rows.size)
-    if min((np.isfinite(each).sum() for each in (*places, *headings)), default=0) < FEWEST:
+        point = next((_POINTS[word] for word in words if word in _POINTS), int(is_place))
+        scale = _UNITS.get(unit, 1.0) / ((is_place and length) or 1.0)
+        table["xy".find(what), point] = scale * row
+    measured = np.array([table[0] + 1j * table[1], np.exp(1j * table[2])])
+    counts = np.isfinite(measured).sum(axis=2)
+    if min(counts[counts > 0], default=0) < FEWEST:
         raise ProblemError(
             f"{path} holds no path of the body: give columns x and y of the centre of mass, or "
             f"head_x, head_y, tail_x, tail_y, or theta."
         )
-    return _Way(points, places, ends, headings)
+    return measured
 
 
 class _Fit:
-    def __init__(self, problem: Problem, way: _Way, gait: Fourier, phases: np.ndarray) -> None:
-        self.problem, self.way, self.gait, self.phases = problem, way, gait, phases
-        numbers, symbols = parameters(problem), {text: x for x, text in COEFFICIENTS.items()}
-        known: dict[str, float] = {}
-        groups: dict[str, list[int]] = {}
-        for k, number in enumerate(numbers):
+    def __init__(
+        self, problem: Problem, measured: np.ndarray, gait: Fourier, phases: np.ndarray
+    ) -> None:
+        self.problem, self.gait, self.phases = problem, gait, phases
+        symbols = {text: x for x, text in COEFFICIENTS.items() if x != "power"}
+        groups: dict[str, tuple[float, list[int]]] = {}
+        for k, number in enumerate(parameters(problem)):
             words, *feet = number.name.split(" of f")
-            if (symbol := symbols.get(words, "power")) != "power":
-                name = " of f".join([symbol, *feet])
+            if words in symbols:
+                name = " of f".join([symbols[words], *feet])
                 forwards = name.replace("mu_b of", "mu_f of")  # a wheel rolls both ways alike
-                name = forwards if known.get(forwards) == number.value else name
-                known[name] = number.value
-                groups.setdefault(name, []).append(k)
+                if groups.get(forwards, (None,))[0] == number.value:
+                    name = forwards
+                groups.setdefault(name, (number.value, []))[1].append(k)
         if not groups:
             raise ProblemError(f"{problem.name} has a law without coefficients: state Friction().")
-        self.groups, self.stated = list(groups.values()), np.array([*known.values()])
-        short = [name.split(" of ")[0] for name in groups]
+        values, self.groups = zip(*groups.values(), strict=True)
+        self.stated, short = np.array(values), [name.split(" of ")[0] for name in groups]
         self.names = short if len({*short}) == len(short) else [*groups]
         self.forward = next((k for k, x in enumerate(short) if x in ("mu_f", "tangential")), 0)
         self.only_ratios = not problem.froude and problem.law.degree is not None
         every = range(len(short))
         self.free = [k for k in every if k != self.forward or not self.only_ratios]
         self.prior = np.eye(len(self.free)) / _VAGUE
-        self.scale = np.full(2, 1e-3)  # noise of places and of headings
-        seen = [2 * np.isfinite(way.places).sum(), np.isfinite(way.headings).sum()]
+        self.noise = np.full((2, 1), 1e-3)  # of places and of headings
+        self.seen = np.isfinite(measured)
+        self.measured = np.where(self.seen, measured, 0)
         # less the numbers that place the axes
-        self.seen = np.array(seen) - [3 * (seen[0] > 0), len(way.headings)]
-        self.freedom = max(float(self.seen.sum()) - len(self.free), 1.0)
+        counts, axes = self.seen.sum(axis=(1, 2)), self.seen.any(axis=2).sum(axis=1)
+        self.counts = counts * [2, 1] - [3 * (axes[0] > 0), axes[1]]
+        self.freedom = max(float(self.counts.sum()) - len(self.free), 1.0)
+        self.extent = self.rms(self.off_from(np.array([0 * phases, 0 * phases + 1])[:, None]))
+        for_path = with_motors(problem.with_(objective=EFFICIENCY), gait)
+        self.mesh = on_fine_mesh(*for_path).mesh
 
     def values(self, x: np.ndarray) -> np.ndarray:
         values = self.stated.copy()
@@ -293,95 +275,71 @@ class _Fit:
                 changed = number.changed(float(f"{value:.{digits}g}") / number.value - 1)
         return changed
 
-    def off(self, x: np.ndarray, gait: Fourier | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Predicted places and headings less measured ones, in the axes that fit best."""
-        at, turned = self.poses(self.with_(x), gait or self.gait)
-        seen = np.isfinite(self.way.places)
-        count = max(int(seen.sum()), 1)
-        both = (np.where(seen, each, 0) for each in (at, self.way.places))
-        at, measured = (each - seen * each.sum() / count for each in both)
-        turn = np.vdot(at, measured)
-        angles = turned - self.way.headings
-        angles -= np.array([np.nanmean(row) for row in angles]).reshape(-1, 1)
-        return at * turn / max(abs(turn), 1e-300) - measured, np.nan_to_num(angles)
+    def off(self, x: np.ndarray, motors: Fourier | None = None) -> np.ndarray:
+        problem, gait = with_motors(self.with_(x), motors or self.gait)
+        motion = on_mesh(problem, gait, self.mesh).motion.sample(self.phases)
+        centre, outline = (
+            x + 1j * y for x, y in (motion.centre, lab_outline(problem.body, motion))
+        )
+        tail, head = np.exp(1j * motion.theta), np.exp(1j * np.angle(outline[-1] - outline[-2]))
+        return self.off_from(np.array([[outline[0], centre, outline[-1]], [tail, tail, head]]))
 
-    def poses(self, problem: Problem, series: Fourier) -> tuple[np.ndarray, np.ndarray]:
-        body, law, t, gait = problem.body, problem.law, self.phases % 1.0, _driven(problem, series)
-        delta = delta_per_period(problem.gait, gait, problem.delta)
-        if problem.froude:
-            regime = problem.regime.at(gait)
-            moving = GaitWithInertia(body, law, gait, delta, froude=regime.froude, regime=regime)
-            rough = moving.find_period()
-            course = moving.periodic_run(rough.momenta, _ACCURACY, rough.slopes).course
-            order = np.argsort(t)
-            theta, x, y = course.at(t[order])[3:6, np.argsort(order)]
-            place, (turn, *end) = x + 1j * y, course.states[3:6, -1]
-            period = RigidMotion(turn, complex(*end))
-        else:
-            motion = fine_motion(body, law, gait, delta, np.linspace(0, 1, 21), _ACCURACY, None)
-            theta, place = motion.at(t)[:2]
-            period = RigidMotion(motion.theta[-1], motion.path[-1])
-        whole = period.repeat(np.floor(self.phases))
-        x, y = whole.of(np.stack([place.real, place.imag]))
-        theta = theta + whole.rotation
-        angles = gait(t)[0]
-        along, across = np.array(body.outline(angles)) - np.array(body.centre(angles))[:, None]
-        outline = (along + 1j * across) * np.exp(1j * theta)
-        at = {"tail": outline[0], "head": outline[-1], "centre": 0 * outline[0]}
-        bent = np.unwrap(np.angle(np.diff(along + 1j * across, axis=0)[-1]))
-        ends = {"tail": theta, "centre": theta, "head": theta + bent}
-        shape = -1, t.size
-        places = np.array([x + 1j * y + at[point] for point in self.way.points], dtype=complex)
-        headings = np.array([ends[end] for end in self.way.ends])
-        return places.reshape(shape), headings.reshape(shape)
+    def off_from(self, predicted: np.ndarray) -> np.ndarray:
+        """Predicted places less measured ones, and the angles between directions, in the axes that
+        fit best, ``(2, 3, n_time)``."""
+        places, turns = np.where(self.seen, predicted, 0)
+        at, measured = (
+            each - self.seen[0] * each.sum() / max(self.seen[0].sum(), 1)
+            for each in (places, self.measured[0])
+        )
+        turn, between = np.vdot(at, measured), turns * self.measured[1].conj()
+        angles = np.angle(between * between.sum(axis=1, keepdims=True).conj())
+        return np.where(self.seen, [at * turn / max(abs(turn), 1e-300) - measured, angles], 0)
 
-    def rms(self, x: np.ndarray) -> float:
-        off = self.off(x)[0 if self.way.points else 1]
-        return float(np.sqrt((np.abs(off) ** 2).mean()))
+    def rms(self, off: np.ndarray) -> float:
+        """Of places, or of headings if there are none."""
+        which = int(not self.seen[0].any())
+        return float(np.sqrt((np.abs(off[which]) ** 2).sum() / self.seen[which].sum()))
 
-    def rows(self, x: np.ndarray, gait: Fourier | None = None) -> np.ndarray:
-        off = zip(self.off(x, gait), self.scale, strict=True)
-        places, angles = (each.ravel() / scale for each, scale in off)
-        return np.concatenate([places.real, places.imag, angles])
+    def rows(self, x: np.ndarray, motors: Fourier | None = None) -> np.ndarray:
+        """What squares are least of: residuals over their noise, and x over its own."""
+        places, angles = self.off(x, motors).reshape(2, -1) / self.noise
+        return np.concatenate([places.real, places.imag, angles.real, self.prior @ x])
 
     def slopes(self, x: np.ndarray) -> np.ndarray:
         steps = _STEP * np.eye(x.size)
-        rows = [(self.rows(x + h) - self.rows(x - h)) / (2 * _STEP) for h in steps]
-        return np.reshape(rows, (x.size, -1)).T
+        return np.transpose([(self.rows(x + h) - self.rows(x - h)) / (2 * _STEP) for h in steps])
 
     def best(self, x: np.ndarray) -> np.ndarray:
         """The best x, and the noise there."""
         if x.size:
-            x = least_squares(
-                lambda x: np.append(self.rows(x), self.prior @ x),
-                x,
-                lambda x: np.vstack([self.slopes(x), self.prior]),
-                bounds=(-_FARTHEST, _FARTHEST),
-                xtol=1e-6,
-            ).x
-        left = np.array([(np.abs(part) ** 2).sum() for part in self.off(x)])
-        share = self.freedom / self.seen.sum()
-        self.scale = np.sqrt(left / np.maximum(self.seen * share, 1)) + _ACCURACY
+            how: Any = {"bounds": (-_FARTHEST, _FARTHEST), "xtol": 1e-6}
+            x = least_squares(self.rows, x, self.slopes, **how).x
+        left = (np.abs(self.off(x)) ** 2).sum(axis=(1, 2))
+        share = self.freedom / self.counts.sum()
+        self.noise = np.sqrt(left / np.maximum(self.counts * share, 1))[:, None] + _ACCURACY
         return x
 
     def covariance(self, x: np.ndarray, samples: Uncertainty | None) -> tuple[float, np.ndarray]:
         """Number of residuals in a row that are alike, and the covariance of x."""
         places, angles = self.off(x)
-        blocks = [each for each in (places.real, places.imag, angles) if each.size]
-        alike = max(1.0, *map(correlation_time, blocks))
+        alike = max(map(correlation_time, (places.real, places.imag, angles.real)))
+        if not x.size:
+            return alike, np.empty((0, 0))
+        self.noise *= alike**0.5
         slopes, here = self.slopes(x), self.rows(x)
-        covariance = np.linalg.inv(slopes.T @ slopes / alike + self.prior.T @ self.prior)
-        if samples is not None and x.size:
+        covariance = np.linalg.inv(slopes.T @ slopes)
+        if samples is not None:
             most = max(samples.directions.shape[2] // 2, self.gait.n_harmonic)
             table = self.gait.resize(most).table
             others = [Fourier.from_table(table + each) for each in samples.directions]
             others += [samples.richer] if samples.richer is not None else []
-            moved = [slopes.T @ (self.rows(x, each) - here) for each in others]
-            effects = covariance @ np.transpose(moved) / alike
-            covariance = covariance + effects @ effects.T
+            moved = np.array([self.rows(x, each) - here for each in others])
+            effects = covariance @ slopes.T @ moved.T
+            covariance += effects @ effects.T
         return alike, covariance
 
-    def say(self, direction: np.ndarray) -> str:
+    def describe(self, direction: np.ndarray) -> str:
         """Sentence about a change of x that the motion does not show."""
         change = np.zeros(len(self.names))
         change[self.free] = direction / np.abs(direction).max()
@@ -396,10 +354,3 @@ class _Fit:
             return f"This gait cannot tell {names} from {others}: {why}."
         by = ", ".join(f"{self.names[k]} {100 * np.expm1(0.1 * change[k]):+.0f} %" for k in parts)
         return f"This gait cannot tell {names} apart: the body moves alike with {by}."
-
-
-def _driven(problem: Problem, series: Fourier) -> AnyGait:
-    if not isinstance(problem.gait, Coupled):
-        return series
-    gears = replace(problem.gait, gait=Harmonic(series.n_harmonic))
-    return gears.driven_by(series, problem.body.n_joint)

@@ -45,7 +45,7 @@ init problem.py -> is there already
 init a,b.py -> letters, digits
 init new.py --links 2 -> 3 to 12
 init new.py --feet 99 -> 0 (a line) to 20
-init | new.py --lengths 1 1e-9 1
+init | new.py --links 1 1e-9 1
 solve | folder.py | fails.py | empty.py | text.h5
 solve nope.py -> there is no problem file
 solve good.h5 -> is a results file (HDF5), not a problem file
@@ -247,7 +247,7 @@ def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):
     bodies = []
     for name, lengths in (("cm", ("22", "30", "30", "22")), ("m", ("0.22", "0.3", "0.3", "0.22"))):
         path = tmp_path / f"{name}.py"
-        assert init([str(path), "--lengths", *lengths, "--wheels"]) == 0
+        assert init([str(path), "--links", *lengths, "--wheels"]) == 0
         bodies.append(read_problem_file(path).problem.body)
     assert bodies[0].lengths == pytest.approx([22 / 104, 30 / 104, 30 / 104, 22 / 104])
     assert bodies[1].lengths == pytest.approx(bodies[0].lengths)
@@ -259,5 +259,5 @@ def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):
 def test_a_body_that_differs_from_both_ends_is_given_gaits_that_it_can_have(tmp_path):
     for lengths, symmetry in ((("1", "2", "1"), "bilateral"), (("1", "2", "3"), "none")):
         path = tmp_path / f"{symmetry}.py"
-        assert init([str(path), "--lengths", *lengths]) == 0
+        assert init([str(path), "--links", *lengths]) == 0
         assert read_problem_file(path).problem.gait.symmetry == symmetry

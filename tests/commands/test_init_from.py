@@ -201,6 +201,31 @@ def test_an_mjcf_has_classes_degrees_and_capsules(tmp_path, capsys):
     assert "rot2 = joint_1, rot3 = joint_2" in capsys.readouterr().out
 
 
+def test_friction_of_an_mjcf_is_that_of_geoms_on_the_floor_and_what_is_not_taken_is_said(
+    tmp_path, capsys
+):
+    """Of two geoms that touch, MuJoCo takes the larger coefficient; one that is not stated is 1."""
+    floor = SWIMMER.replace('<geom type="plane"', '<geom type="plane" friction="0.2"')
+    slippery = floor.replace('<geom type="capsule"', '<geom type="capsule" friction="0.4 0.01"')
+    assert read(tmp_path, slippery, kind="xml").friction == Friction(0.4, 0.4, 0.4)
+    assert read(tmp_path, floor, kind="xml").friction == Friction(1, 1, 1)
+    assert read(tmp_path, slippery, "--mu", "0.3", kind="xml").friction.mu_t == 0.3
+    capsys.readouterr()
+    mixed = slippery.replace('<geom fromto="0.01', '<geom friction="0.7" fromto="0.01')
+    assert read(tmp_path, mixed, kind="xml").friction == Friction(1, 1, 1)
+    assert "from 0.4 to 0.7, are not taken: state --mu" in capsys.readouterr().out
+    assert read(tmp_path, mixed, "--mu", "0.5", kind="xml").friction.mu_f == 0.5
+    assert "not taken" not in capsys.readouterr().out
+    inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    damped = [each.replace("</inertial>", inertia) for each in WORM]
+    damped[-1] = damped[-1].replace("</joint>", '<dynamics damping="0.1"/></joint>')
+    read(tmp_path, damped)
+    said = capsys.readouterr().out
+    assert (
+        "not taken: moments of inertia (links count as uniform rods), friction and damping" in said
+    )
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [
