@@ -5,6 +5,7 @@
     python -m benchmarks.zoo --modes --problems 20
     python -m benchmarks.zoo --paced --problems 20
     python -m benchmarks.zoo --feet --problems 100
+    python -m benchmarks.zoo --robots --problems 50 [--links 6] [--starts 128]
 
 Bodies of 3 to 6 links, equal or not; mu_t from 0.3 to 10, mu_b equal to mu_f or up to 5 times it; 1
 to 4 harmonics, splines and polygons; every symmetry that the body has; joints within pi, 2.5 or
@@ -16,6 +17,11 @@ bodies of 2 to 5 links, a third of them on feet, played at Froude numbers from 0
 share. For each: whether it is solved, its value over the best ever found for that problem (in
 benchmarks/zoo_best.json, which a better answer updates), and the processor time. Failures are
 printed with the reason.
+
+With --robots robots in SI units, as `colloc init` states them: 3 to 12 links that lie or stand on
+feet, wheels or both, and random limits. Each answer is compared with the best serpenoid of a grid
+of amplitude and lag, with the gait that begins from it, and with that of --starts. What is in
+benchmarks/zoo_robots.json is not computed again.
 """
 
 from __future__ import annotations
@@ -23,8 +29,11 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -40,18 +49,25 @@ from colloc import (
     Polygon,
     PowerLaw,
     Problem,
+    Robot,
     Viscous,
     Wheel,
 )
 from colloc.gaits.harmonic import harmonics_within
 from colloc.gaits.objective import EFFICIENCY
+from colloc.gaits.serpenoid import Serpenoid
+from colloc.gaits.starts import largest_amplitude
 from colloc.mechanics.law import Law, rate_independent
 from colloc.results.solution import SOLVED
+from colloc.search.iterate import Iterate, evaluate_at, space_near
 from colloc.search.solve import solve
+from colloc.system.errors import CollocError
 
 BEST = Path(__file__).with_name("zoo_best.json")
+ROBOTS = Path(__file__).with_name("zoo_robots.json")
 GOOD = 0.99
 _KNOTS = 24
+_ADMISSIBLE = 1e-3  # violation of a wave
 SEED = 21
 
 
@@ -256,6 +272,93 @@ def _drawn_feet(rng: np.random.Generator, body: Chain) -> tuple[Foot, ...]:
     return tuple(feet)
 
 
+def robot_problem(number: int) -> Problem:
+    """Problem `number` of the family of robots; it depends on that number alone. Among any ten in
+    a row are all numbers of links, and among the small ones all floors."""
+    rng = np.random.default_rng([SEED + 5, number])
+    links = 3 + 3 * number % 10
+    floor = (links + number // 10) % 4
+    mu, uneven = float(rng.uniform(0.2, 0.8)), rng.random() < 0.5
+    rolling = round(float(rng.uniform(0.01, 0.1)), 3)
+    on_wheels = rng.permutation(links) < links / 2 if floor == 3 else [floor == 2] * links
+    feet = tuple(
+        Wheel(k, rolling=rolling, sideways=round(mu, 2)) if rolls else Foot(k)
+        for k, rolls in enumerate(on_wheels)
+    )
+    lengths = _parts(rng.uniform(0.5, 1.5, links) if uneven else np.ones(links))
+    length, mass, period = (
+        float(f"{np.exp(rng.uniform(np.log(a), np.log(b))):.2g}")
+        for a, b in ((0.3, 1.5), (0.3, 5.0), (1.5, 15.0))
+    )
+    limits: dict[str, Any] = {}
+    if rng.random() < 0.5:
+        limits["max_speed"] = round(float(rng.uniform(2.0, 8.0)), 1)
+    if rng.random() < 0.4:
+        limits["max_torque"] = float(f"{rng.uniform(0.1, 0.4) * mu * mass * 9.81 * length:.2g}")
+    if idle := rng.random() < 0.6:
+        limits["idle_power"] = float(f"{np.exp(rng.uniform(np.log(0.1), np.log(4.0))):.2g}")
+    joints = np.radians(np.round(rng.uniform(50.0, 110.0, links - 1)))
+    problem = Problem(
+        f"zoo-robots-{number}",
+        body=Chain(lengths, feet=feet if floor else 0),
+        friction=Friction(*[round(mu, 2)] * 3),
+        gait=Harmonic(2, "none"),
+        joint_limit=tuple(joints) if rng.random() < 0.3 else joints[0],
+        robot=Robot(length=length, mass=mass, period=period, **limits),
+        least_distance=None if idle else 0.1,
+    )
+    if problem.froude or lengths != lengths[::-1] or floor == 3:
+        return problem
+    return problem.with_(gait=Harmonic(2, "bilateral"), guess=None)
+
+
+def best_serpenoid(problem: Problem) -> Iterate:
+    """The best of the serpenoid waves of one harmonic that keep all limits, or else the one that
+    exceeds them least, of ten amplitudes and thirty lags. None has an offset, which turns the
+    body."""
+    waves, n = [], problem.body.n_joint
+    for lag in np.linspace(-np.pi, np.pi, 30):
+        unit = Serpenoid(1, "antipodal").member(np.array([lag, 1.0]), n)
+        for part in np.linspace(0.1, 1.0, 10) * largest_amplitude(problem, unit):
+            with suppress(CollocError):
+                near = space_near(problem, unit.scaled(part))
+                waves.append(evaluate_at(*near, problem.delta))
+    return min(waves, key=lambda wave: (max(wave.violation, _ADMISSIBLE), wave.objective))
+
+
+def compare_robot(number: int, starts: int | None) -> dict[str, Any]:
+    """What different ways lead to for a robot: values, 0 of what is not solved, and seconds."""
+    problem = robot_problem(number)
+    row = _stored(ROBOTS).get(problem.name, {"at least": {}})
+
+    def keep(way: str, compute: Callable[[], Any]) -> Any:
+        begin, outcome = time.process_time(), None
+        try:
+            outcome = compute()
+        except CollocError as error:
+            print(f"{problem.name}, {way}: {error}")
+        if isinstance(outcome, Iterate):
+            good = outcome.violation <= _ADMISSIBLE
+        else:
+            good = outcome is not None and outcome.status == SOLVED
+        row[way] = outcome.value if outcome is not None and good else 0.0
+        if way == "default" and outcome is not None:
+            row["at least"] = {aim.name: least for aim, least in outcome.problem.at_least}
+        row[f"{way} [s]"] = round(time.process_time() - begin, 1)
+        rows = _stored(ROBOTS) | {problem.name: row}
+        ROBOTS.write_text(json.dumps(rows, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+        return outcome
+
+    if "default" not in row:
+        keep("default", lambda: solve(problem))
+    problem = problem.with_(at_least=row["at least"])
+    if "begun from it" not in row and (wave := keep("serpenoid", lambda: best_serpenoid(problem))):
+        keep("begun from it", lambda: solve(problem.with_(guess=wave.gait), 1))
+    if starts and f"{starts} starts" not in row:
+        keep(f"{starts} starts", lambda: solve(problem, starts))
+    return row
+
+
 def described(problem: Problem) -> str:
     """In one line."""
     law, best = (
@@ -269,9 +372,28 @@ def described(problem: Problem) -> str:
     return f"{best}{problem.body.describe()}, {law} {shapes}{limit}{slope}{paced}"
 
 
-def known_bests() -> dict[str, float]:
-    """The best value ever found, by name of problem."""
-    return json.loads(BEST.read_text(encoding="utf-8")) if BEST.exists() else {}
+def _stored(path: Path) -> dict[str, Any]:
+    """What is known of problems, by name: the best value ever found, or the ways to it."""
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
+def compare_robots(numbers: range, links: int, starts: int | None) -> None:
+    """Compare and print robots of at most so many links."""
+    ratios = []
+    for number in numbers:
+        problem = robot_problem(number)
+        if problem.body.n_joint >= links:
+            continue
+        row = compare_robot(number, starts)
+        values = {way: row[way] for way in row if f"{way} [s]" in row}
+        best = max(values.values())
+        ratios.append(values["default"] / best)
+        shown = ", ".join(
+            f"{x} {v / best:.4f} ({row[f'{x} [s]']:.0f} s)" for x, v in values.items()
+        )
+        print(f"{number:4d} {best:9.6f} {shown}; {problem.body.describe()}", flush=True)
+    n_good = sum(ratio > GOOD for ratio in ratios)
+    print(f"{n_good} of {len(ratios)} within 1 % of the best of all")
 
 
 def main() -> None:
@@ -283,33 +405,22 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, metavar="K", help="begin with this one")
     parser.add_argument("--starts", type=int, metavar="N", help="more look for better answers")
     family = parser.add_mutually_exclusive_group()
-    family.add_argument(
-        "--laws",
-        dest="of",
-        action="store_const",
-        const=law_problem,
-        help="other laws, objectives and limits",
-    )
-    family.add_argument(
-        "--modes",
-        dest="of",
-        action="store_const",
-        const=modal_problem,
-        help="smooth bodies of a few bending modes",
-    )
-    family.add_argument(
-        "--paced", dest="of", action="store_const", const=paced_problem, help="bodies with inertia"
-    )
-    family.add_argument(
-        "--feet",
-        dest="of",
-        action="store_const",
-        const=feet_problem,
-        help="bodies on feet and wheels",
-    )
+    for flag, of, what in (
+        ("--laws", law_problem, "other laws, objectives and limits"),
+        ("--modes", modal_problem, "smooth bodies of a few bending modes"),
+        ("--paced", paced_problem, "bodies with inertia"),
+        ("--feet", feet_problem, "bodies on feet and wheels"),
+        ("--robots", robot_problem, "robots in SI units, beside serpenoid gaits"),
+    ):
+        family.add_argument(flag, dest="of", action="store_const", const=of, help=what)
+    parser.add_argument("--links", type=int, default=12, metavar="N", help="robots of no more")
     parser.set_defaults(of=zoo_problem)
     options = parser.parse_args()
-    best = known_bests()
+    if options.of is robot_problem:
+        numbers = range(options.first, options.first + options.problems)
+        compare_robots(numbers, options.links, options.starts)
+        return
+    best = _stored(BEST)
     solved, quality, seconds = [], [], []
     for number in range(options.first, options.first + options.problems):
         problem = options.of(number)
@@ -324,7 +435,7 @@ def main() -> None:
         seconds.append(time.process_time() - begin)
         solved.append(status == SOLVED)
         if status == SOLVED and value > best.get(problem.name, 0.0):
-            best = {**known_bests(), problem.name: value}  # another run may have written meanwhile
+            best = {**_stored(BEST), problem.name: value}  # another run may have written meanwhile
             BEST.write_text(json.dumps(best, indent=1, sort_keys=True) + "\n", encoding="utf-8")
         quality.append(value / best[problem.name] if solved[-1] else 0.0)
         line = (

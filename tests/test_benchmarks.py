@@ -7,8 +7,15 @@ from benchmarks.peer_table import OPTIMA, judged
 from benchmarks.peers import drag, physics
 from benchmarks.peers.starts import feasible_motion, starts
 from benchmarks.published import DIFFERS, number, scallop, small_stroke, small_wave
-from benchmarks.zoo import described, law_problem, modal_problem, zoo_problem
-from colloc import Chain, Friction, ellipse, replay
+from benchmarks.zoo import (
+    best_serpenoid,
+    described,
+    law_problem,
+    modal_problem,
+    robot_problem,
+    zoo_problem,
+)
+from colloc import Chain, Friction, ellipse, evaluate, replay
 from colloc.mechanics.balance import instant, net_force, total_power
 from scripts.models.ellipses import admissible
 
@@ -71,3 +78,22 @@ def test_the_numbers_of_the_zoo_keep_their_problems_and_all_families_are_stated(
     assert law_problem(7).hash == law_problem(7).hash != law_problem(2).hash
     assert described(modal_problem(0)).startswith("smooth, 2 legendre modes")
     assert {modal_problem(k).body.modes for k in range(20)} == {2, 3, 4, 5, 6}
+
+
+def test_ten_robots_have_all_numbers_of_links_and_those_of_few_stand_on_all_floors():
+    robots = [robot_problem(k) for k in range(10)]
+    assert {robot.body.n_link for robot in robots} == {*range(3, 13)}
+    few = [robot.body.feet for robot in robots if robot.body.n_link < 7]
+    rolls = [{foot.friction is not None for foot in feet} for feet in few]
+    assert all(each in rolls for each in (set(), {False}, {True}, {False, True}))
+
+
+@pytest.mark.slow
+def test_the_best_serpenoid_of_a_robot_is_a_wave_within_its_limits_that_is_worth_as_much_replayed():
+    robot = robot_problem(44)
+    wave = best_serpenoid(robot)
+    assert wave.violation < 1e-3
+    assert np.abs(wave.gait.angles(np.arange(100) / 100)).max() <= np.min(robot.joint_limit)
+    phases = np.unwrap(np.angle(wave.gait.cos - 1j * wave.gait.sin)[:, 0])
+    np.testing.assert_allclose(np.diff(phases, 2), 0.0, atol=1e-9)
+    assert evaluate(robot, wave.gait).value == pytest.approx(wave.value, rel=1e-2)
