@@ -42,7 +42,7 @@ ORDER = {
         howto/laws howto/steering howto/objectives howto/check howto/sensitivity howto/starts
         howto/studies howto/cluster howto/own_body howto/columns howto/own_gait_class howto/paper
         troubleshooting""",
-    "Reference": "reference known limits commands api modules changelog cite",
+    "Reference": "reference known published limits commands api modules changelog cite",
     "Explanation": "theory search gait_classes bound bodies smooth_bodies",
 }
 PICTURES = (".png", ".gif")
