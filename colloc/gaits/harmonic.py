@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 from typing import Any
 
@@ -202,21 +202,7 @@ class Harmonic(LinearClass):
         return np.arange(n) / n
 
     def _basis(self, n_joint: int) -> np.ndarray:
-        columns, n_function = [], 2 * self.harmonics + 1
-        for function, joint in product(range(n_function), range(n_joint)):
-            harmonic, sine = (function + 1) // 2, function > 0 and function % 2 == 0
-            column, partner = np.zeros((n_joint, n_function)), n_joint - 1 - joint
-            column[joint, function] = 1.0
-            if self.symmetry == ANTIPODAL and harmonic % 2 == 0:
-                continue
-            if self.symmetry == BILATERAL:
-                if partner < joint or (partner == joint and not sine):
-                    continue
-                column[partner, function] = 1.0 if sine else -1.0
-            elif joint == 0 and function == 2:
-                continue  # the start phase is free: no first sine of the first joint
-            columns.append(column.ravel())
-        return np.array(columns).T
+        return _series_basis(self, n_joint)
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Fourier:
         with np.errstate(over="ignore", invalid="ignore"):  # a series refuses what is not finite
@@ -286,3 +272,23 @@ def shift_phase(gait: Fourier, phase: float) -> Fourier:
     k = 2 * np.pi * np.arange(1, gait.n_harmonic + 1) * phase
     cos, sin = np.cos(k), np.sin(k)
     return Fourier(gait.mean, gait.cos * cos + gait.sin * sin, gait.sin * cos - gait.cos * sin)
+
+
+@lru_cache(maxsize=64)
+def _series_basis(gaits: Harmonic, n_joint: int) -> np.ndarray:
+    """Parameters to the table of a series, ``(n_joint (2 K + 1), n_parameter)``."""
+    columns, n_function = [], 2 * gaits.harmonics + 1
+    for function, joint in product(range(n_function), range(n_joint)):
+        harmonic, sine = (function + 1) // 2, function > 0 and function % 2 == 0
+        column, partner = np.zeros((n_joint, n_function)), n_joint - 1 - joint
+        column[joint, function] = 1.0
+        if gaits.symmetry == ANTIPODAL and harmonic % 2 == 0:
+            continue
+        if gaits.symmetry == BILATERAL:
+            if partner < joint or (partner == joint and not sine):
+                continue
+            column[partner, function] = 1.0 if sine else -1.0
+        elif joint == 0 and function == 2:
+            continue  # the start phase is free: no first sine of the first joint
+        columns.append(column.ravel())
+    return np.array(columns).T
