@@ -111,6 +111,10 @@ import numpy as np
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics import native_kernel
 from colloc.mechanics.fixed_point import motion_and_derivatives
+from colloc.dynamics.compiled_period import CompiledPeriod
+from colloc.dynamics.dynamics import QuasiStatic, Shapes, TotalGradient
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
 from research.guarantee.c_compiler import compiled_library
 from research.guarantee.kernel import FLAGS
 
@@ -126,6 +130,11 @@ for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
         motion_and_derivatives(body, law, *at, 1e-4, solve_balance(body, law, *at, 1e-4))
         for method in ("newton", "fixed_point"):
             solve_balance(body, law, *at, 1e-2, method=method, max_iterations=20, start=np.zeros((3, 20)))
+        mesh = Mesh(scheme("hermite-simpson"), np.linspace(0.0, 1.0, 7))
+        period = CompiledPeriod.of(QuasiStatic(body, law), mesh)
+        shapes = Shapes(*(each[:, : mesh.n_point] for each in at), 1e-3)
+        z, out, totals = period.simulate(shapes, np.full((3, mesh.n_point), np.nan))
+        period.vjp(shapes, z, out, [TotalGradient(1 + 1j, 1.0, 1.0)] * 2)
 """
 
 
