@@ -61,9 +61,9 @@ class ReferenceMotion(NamedTuple):
     error: float  # about that of these states
     sums: Callable[[np.ndarray], np.ndarray] | None = None
     """Quantities that forces are needed for up to ascending phases, ``(k, n)``."""
-    alone: Callable[..., Any] | None = None
-    """Intervals by themselves (`colloc.dynamics.dynamics.Inertial.alone`); None: their errors are
-    seen in the whole motion."""
+    solve_intervals: Callable[..., Any] | None = None
+    """`colloc.dynamics.dynamics.Inertial.solve_intervals`; None: errors of intervals are seen in
+    the whole motion."""
 
 
 class Known(NamedTuple):
@@ -101,9 +101,9 @@ def gait_motion(
         begin, _, slopes = moving.rough_period(on_mesh.along.edges[:, 0])
         times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
         run = moving.periodic_run(begin, max(error / times, LEAST), slopes)
-        alone = kind.alone  # type: ignore[attr-defined]
+        by_interval = kind.solve_intervals  # type: ignore[attr-defined]
         sums = partial(moving.sums, run.course, run.aim)
-        return ReferenceMotion(run.course.at, times * run.aim, sums, alone)
+        return ReferenceMotion(run.course.at, times * run.aim, sums, by_interval)
     if regime.slides:
         on = GaitOnSlope(body, law, gait, delta, regime.grade, gait.corner_phases)
         ran = on.integrate(gait.theta, error)
@@ -283,7 +283,7 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     displacement = np.diff(pose.place) - (x + 1j * y)
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     by_states: Any = 0.0
-    if exact.alone is not None:
+    if exact.solve_intervals is not None:
         # momenta, perhaps theta
         states, near = (at[: len(kind.states)] for at in (at_edges, exact.at(mesh.times)))
         out, ends, solved = exact.solve_intervals(mesh, shapes, along, states[:, :-1], near)
