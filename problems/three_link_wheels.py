@@ -2,8 +2,8 @@
 
 A robot whose joints turn at a bounded rate goes fastest by the gait of most distance per path.
 Friction across the links is ten times that along them. The most efficient gait of the class goes
-0.0482 body lengths per radian, and saves 4 % of work; `colloc pareto problems/three_link_wheels.py`
-finds the certified gaits between.
+0.0482 body lengths per radian, and saves 4 % of work; `colloc pareto` finds gaits between,
+with `--objectives speed efficiency`.
 """
 
 from colloc import Friction, Harmonic, Problem

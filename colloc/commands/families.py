@@ -3,35 +3,34 @@
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import json
 import math
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from colloc.commands import main as cli
-from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK, naming_saved_files
+from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK
+from colloc.commands.front import Found, find_family, find_front
 from colloc.commands.solve import bound_facts, save_and_tell
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.objective import EFFICIENCY, SPEED, objective_from
+from colloc.gaits.objective import objective_from
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
 from colloc.results.archive import STATUSES, Basin, Outcome, basins, counts
-from colloc.results.kept import save_result
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import ProblemError, StoreError
-from colloc.system.files import SUFFIX, lock_file, write_text
+from colloc.system.files import SUFFIX, lock_file
 
 if TYPE_CHECKING:
-    from colloc.studies.families import ParetoFront, Steering
+    from colloc.gaits.problem_file import ProblemFile
+    from colloc.studies.families import Steering
     from colloc.studies.study import Study
     from colloc.studies.sweep import StudyTable
 
@@ -41,7 +40,6 @@ _TIME_LIMIT = cli.option(
 )
 _MOST_SHOWN = 12
 _SAVE_EVERY = 60.0  # seconds
-_AIMS = SPEED.name, EFFICIENCY.name
 
 
 def starts_summary(
@@ -295,52 +293,19 @@ def sweep_summary(study: Study, table: StudyTable, path: Path) -> tuple[dict[str
     return facts, lines
 
 
-def _family(
-    options: argparse.Namespace,
-    ending: str,
-    find: Callable[[Problem, int, Callable[..., None]], Any],
-    describe: Callable[[Any, dict[Path, Solution]], tuple[str, dict[str, Any], list[str]]],
-) -> int:
-    """Find a family, save its members and its table, draw and print it; the exit code.
-
-    `find` is called with the problem, the number of starts and what shows progress. From the
-    family and its members by their paths `describe` gives the text of the table, facts, and lines
-    for people.
-    """
+def _begin(options: argparse.Namespace, ending: str) -> tuple[ProblemFile, Path, int]:
+    """The problem, the table to write and the number of starts."""
     stated, problem = cli.read_problem(options)
     table = cli.output_path(options, Path("results") / f"{problem.name}.{ending}")
     from colloc.search.options import OPTIONS
-    from colloc.studies.solve import checkpoints_in
 
     starts = options.starts or stated.starts or OPTIONS.starts
-    members, saved = dict[Path, Solution](), []
-    with checkpoints_in(table.with_suffix("")):
-        with cli.status_line(options) as line:
+    return replace(stated, problem=problem), table, starts
 
-            def say(what: str, point: Solution | None = None) -> None:
-                value = point and f": {point.problem.objective.short} = {point.value:.6g}"
-                line.say(f"{problem.name}: {what}{value or ''}")
 
-            family = find(problem, starts, say)
-        named = {f"{k:02d}": point for k, point in enumerate(family.points)}
-        if spot := getattr(family, "on_the_spot", None):
-            named |= {f"spot_{k:02d}": point for k, point in enumerate(spot.points)}
-        for name, solution in named.items():
-            solution.source = stated.source
-            saved += (one := save_result(solution, table.with_suffix("") / f"{name}.h5"))
-            members[one[0].path] = solution
-        content, facts, lines = describe(family, members)
-        write_text(table, content)
-        points = f", {next(iter(members))} ..."
-        files = [table]
-        if not options.no_figure:
-            from colloc.pictures.style import save as save_figure
-
-            with naming_saved_files([f"{table}{points}"]):
-                files += save_figure(family.plot(), table.with_suffix(""), ("png",))
-        last = f"  saved {', '.join(map(str, files))}{points}"
-        lines = [f"{problem.name}: {lines[0]}", *lines[1:], last]
-        cli.tell(options, facts | {"file": str(table)}, lines, saved)
+def _end(options: argparse.Namespace, found: Found) -> int:
+    family, facts, lines, saved = found
+    cli.tell(options, facts, lines, saved)
     return OK if family.certified else FAILED
 
 
@@ -349,58 +314,28 @@ def _family(
 An objective is "efficiency", "speed", "turning", or an expression of distance, work, rotation and
 length of a period. Every point is a result: NAME.front/00.h5 is the best by the first objective,
 the last one the best by the second. Exit code 4: a gap is left where gaits are not certified.
+colloc solve --front begins at the answer.
 
-  colloc pareto mine.py --objectives distance "distance / work" --points 15""",
+  colloc pareto mine.py --objectives speed "distance / work" --points 15""",
     *cli.PROBLEM,
     cli.option(
         str,
         "--objectives",
         ("FIRST", "SECOND"),
-        f"default: {' '.join(_AIMS)}",
+        "default: distance, and what the problem maximises",
         nargs=2,
-        default=_AIMS,
+        default=(None, None),
     ),
-    cli.option(int, "--points", "N", "of the front, without duplicates (default: 9)", 9, least=2),
+    cli.option(int, "--points", "N", "about so many, without duplicates (default: 5)", 5, least=2),
     cli.option(int, "--starts", "N", "starting points for both ends (default: 32)", least=1),
     cli.output("folder, or .csv file (default: results/NAME.front.csv)"),
     cli.NO_FIGURE,
 )
 def pareto(options: argparse.Namespace) -> int:
-    first, second = aims = [objective_from(text) for text in options.objectives]
-
-    def find(problem: Problem, starts: int, say: Callable[..., None]) -> ParetoFront:
-        from colloc.studies.families import pareto_front
-
-        def report(k: int, point: Solution) -> None:
-            last = options.points - 1
-            say(f"point {k} of {last}" if k <= last else "in a gap", point)
-
-        say("the ends of the front")
-        return pareto_front(problem, first, second, options.points, starts=starts, progress=report)
-
-    def describe(
-        front: ParetoFront, members: dict[Path, Solution]
-    ) -> tuple[str, dict[str, Any], list[str]]:
-        names = ["point", *(x.expression for x in aims), "distance", "work", "status", "file"]
-        every = zip(members.items(), front.values.tolist(), strict=True)
-        rows = [
-            [k, *both, point.measured.distance, point.measured.work, point.status, str(path)]
-            for k, ((path, point), both) in enumerate(every)
-        ]
-        content = io.StringIO(newline="")
-        csv.writer(content).writerows([names, *rows])
-        empty = {gap.after: f"\n       nothing found between: {gap.why}" for gap in front.gaps}
-        facts = {
-            "objectives": [aim.fields() for aim in aims],
-            "points": [dict(zip(names, row, strict=True)) for row in rows],
-            "gaps": [asdict(gap) for gap in front.gaps],
-        }
-        lines = [f"{first.name} against {second.name}, {len(rows)} points"]
-        for k, a, b, _, _, status, _ in rows:
-            lines.append(f"  {k:3d}  {a:11.7f}  {b:11.7f}  {status}{empty.get(k, '')}")
-        return content.getvalue(), facts, lines
-
-    return _family(options, "front.csv", find, describe)
+    first, second = (text and objective_from(text) for text in options.objectives)
+    stated, table, starts = _begin(options, "front.csv")
+    how = {"first": first, "second": second, "points": options.points, "starts": starts}
+    return _end(options, find_front(options, stated, table, **how))
 
 
 @cli.command(
@@ -428,7 +363,9 @@ def steer(options: argparse.Namespace) -> int:
             "could turn the other way."
         )
 
-    def find(problem: Problem, starts: int, say: Callable[..., None]) -> Steering:
+    stated, table, starts = _begin(options, "steer.json")
+
+    def find(say: Callable[..., None]) -> Steering:
         from colloc.studies.families import steer as find_gaits
 
         def report(turn: float, point: Solution) -> None:
@@ -436,7 +373,7 @@ def steer(options: argparse.Namespace) -> int:
 
         say("the straight gait")
         turns, spot = ([*map(math.radians, each)] for each in (options.turn, options.spot))
-        return find_gaits(problem, turns, spot=spot, starts=starts, progress=report)
+        return find_gaits(stated.problem, turns, spot=spot, starts=starts, progress=report)
 
     def describe(
         family: Steering, members: dict[Path, Solution]
@@ -453,4 +390,4 @@ def steer(options: argparse.Namespace) -> int:
         facts = family.table() | {"efficiency": family.efficiency.tolist()}
         return json.dumps(facts) + "\n", facts, lines
 
-    return _family(options, "steer.json", find, describe)
+    return _end(options, find_family(options, stated, table, find, describe))

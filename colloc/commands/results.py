@@ -4,7 +4,6 @@ compare two), report, animate, export, robot, sensitivity."""
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,9 @@ import numpy as np
 
 from colloc.commands import main as cli
 from colloc.commands.ending import FAILED, OK
-from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.checks import Certificate
-from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE, distance, fourier_series
+from colloc.results.comparison import compare, verdict
 from colloc.results.robot import RobotSheet, stated_robot
 from colloc.results.solution import Solution
 from colloc.results.store import load
@@ -47,6 +45,7 @@ _ENDINGS = {
     "mjcf": "xml",
     "urdf": "urdf",
 }
+_BESIDE = "beside", {"metavar": "OTHER.h5", "nargs": "?", "help": "another result, shown beside it"}
 _SERVO = tuple(
     cli.option(kind, f"--{name}", metavar, f"of servos: {what}, one or one each", nargs="+")
     for kind, name, metavar, what in (
@@ -83,32 +82,6 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
     if recorded.passed and not now.passed:
         return "the file's certificate passed all checks, the new one does not."
     return ""
-
-
-def gait_distance(a: Solution, b: Solution) -> float | None:
-    """R.m.s. distance [rad] of two gaits of a body, minimised over phase and symmetries."""
-    if a.problem.body != b.problem.body:
-        return None
-    law = b.problem.law if a.problem.law.reversible else a.problem.law
-    first, second = (fourier_series(each.problem, each.gait) for each in (a, b))
-    return distance(first, second, a.problem.body, law)
-
-
-def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
-    """True if two results are the same optimum, and a sentence."""
-    what, other = a.problem.objective, b.problem.objective
-    if other != what:
-        return False, f"other objectives: {what.name} and {other.name}."
-    values = [each.measured.value for each in (a, b)]
-    difference = abs(values[0] - values[1]) / max(*map(abs, values), 1e-300)
-    values_of = "efficiencies" if what == EFFICIENCY else f"values of {what.name}"
-    differ = f"{values_of} differ by {100 * difference:.3g} %"
-    apart = gait_distance(a, b)
-    if apart is None:
-        return False, f"other bodies; {differ}."
-    same = difference <= SAME_VALUE and apart < SAME_GAIT
-    angles = f"joint angles by {apart:.3g} rad (root mean square)"
-    return same, f"{'the same optimum' if same else 'different'}: {differ}, {angles}."
 
 
 @cli.command(
@@ -178,38 +151,8 @@ def verify(options: argparse.Namespace) -> int:
 
 def _compare(options: argparse.Namespace, a: Solution, b: Solution) -> int:
     """Print two results and the changes of their problems side by side; the exit code."""
-
-    def short(value: object) -> str:
-        text = json.dumps(value)
-        return text if len(text) <= 44 else text[:41] + "..."
-
-    def outcome(solution: Solution) -> dict[str, str]:
-        answer, certificate, measured = solution.answer, solution.certificate, solution.measured
-        replayed = certificate.replayed
-        error = f" +- {certificate.efficiency_error:.0e}" if replayed else " (not replayed)"
-        limit = f"{certificate.efficiency_at_zero_delta:.6f}" if replayed else "-"
-        return {
-            "": solution.problem.name,
-            "status": solution.status,
-            "objective": solution.problem.objective.name,
-            "value": f"{measured.value:.6f}",
-            "  error": f"{certificate.value_error:.0e}" if replayed else "-",
-            "efficiency": f"{measured.efficiency:.6f}{error}",
-            "  at delta -> 0": limit,
-            "distance d": f"{measured.distance:.6f}",
-            "work W": f"{measured.work:.6f}",
-            "delta": f"{answer.delta:.1e}",
-            "intervals": str(answer.edges.size - 1),
-            "iterations": str(sum(step.iterations for step in solution.history)),
-            "seconds": f"{solution.seconds:.1f}",
-        }
-
-    same, sentence = verdict(a, b)
-    one, two = a.problem.to_dict(), b.problem.to_dict()
-    names = [name for name in {**one, **two} if one.get(name) != two.get(name)]
-    changes = [(name, short(one.get(name)), short(two.get(name))) for name in names]
-    second = outcome(b)
-    rows = [(name, value, second[name]) for name, value in outcome(a).items()]
+    (same, sentence), (rows, changes) = verdict(a, b), compare(a, b)
+    rows = [("", a.problem.name, b.problem.name), *rows]
     facts = {
         "same": same,
         "verdict": sentence,
@@ -226,6 +169,11 @@ def _compare(options: argparse.Namespace, a: Solution, b: Solution) -> int:
     return OK if same else DIFFERENT
 
 
+def _named(source: Path, other: str | Path | None, kind: str) -> Path:
+    stem = f"{source.stem}-{Path(other).stem}" if other else source.stem
+    return source.with_name(stem + kind)
+
+
 def _write(path: Path) -> tuple[dict[str, Any], str]:
     size = path.stat().st_size
     return {"status": "written", "file": str(path), "bytes": size}, f"{size / 1000:.0f} kB"
@@ -233,11 +181,14 @@ def _write(path: Path) -> tuple[dict[str, Any], str]:
 
 @cli.command(
     """\
-The page needs no network and no other file. Results that failed get one too.
+The page needs no network and no other file. Results that failed get one too; the front that solve
+--front left beside the result is in it.
 
   colloc report results/three_link.h5                 results/three_link.html
-  colloc report results/three_link.h5 --length 1.2 --mass 3 --period 5   of a robot""",
+  colloc report results/three_link.h5 --length 1.2 --mass 3 --period 5   of a robot
+  colloc report results/a.h5 results/b.h5             results/a-b.html: a, with b beside it""",
     cli.RESULT,
+    _BESIDE,
     cli.option(
         str, "--problem", "FILE.py", "problem file with the REFERENCE to compare the result with"
     ),
@@ -248,17 +199,24 @@ The page needs no network and no other file. Results that failed get one too.
 )
 def report(options: argparse.Namespace) -> int:
     from colloc.pictures.report_page import write_report
+    from colloc.studies.families import read_front
 
     source = Path(options.result)
     solution = load(source)
-    path = cli.output_path(options, source.with_suffix(".html"))
+    beside = load(options.beside) if options.beside else None
+    path = cli.output_path(options, _named(source, options.beside, ".html"))
     reference = read_problem_file(options.problem).reference if options.problem else None
     stated = stated_robot(solution, **cli.values(options, *_ROBOT))
     robot = RobotSheet(solution, **stated) if stated else None
-    figures: list[str] = []
+    table, front, figures = source.with_suffix(".front.csv"), None, list[str]()
+    if table.exists():
+        front = read_front(table, solution.problem)
+        if front is None:
+            cli.complain(f"{table} is of another problem, and left out.")
     with cli.status_line(options) as line:
         line.say("writing the page")
-        write_report(solution, path, reference, source.parent, robot=robot)
+        sections = {"robot": robot, "front": front, "beside": beside}
+        write_report(solution, path, reference, source.parent, **sections)
         if options.figures:
             from colloc.pictures.figure import save_panels
 
@@ -280,7 +238,7 @@ and periods, or metres and seconds where both problems state a robot.
   colloc animate results/a.h5 results/b.h5                        results/a-b.gif
   colloc animate results/three_link.h5 --format mp4 --fps 50      needs ffmpeg""",
     cli.RESULT,
-    ("beside", {"metavar": "OTHER.h5", "nargs": "?", "help": "another result, shown beside it"}),
+    _BESIDE,
     cli.option(
         str,
         "--format",
@@ -300,8 +258,7 @@ def animate(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution, other = load(source), options.beside and Path(options.beside)
     beside = load(other) if other else None
-    both = source.with_name(f"{source.stem}-{other.stem}.gif") if other else source
-    path = cli.output_path(options, both, ("gif", "mp4"))
+    path = cli.output_path(options, _named(source, other, ".gif"), ("gif", "mp4"))
     # slow imports only now: a bad option is refused at once
     from colloc.pictures.movie import write_movie
 

@@ -505,6 +505,7 @@ from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
     ),
     cli.BOUND,
     cli.flag("--dry", "certify it also under dry friction, with no delta (a second)"),
+    cli.flag("--front", "also gaits from this one to the farthest: NAME.front.csv, NAME.front/"),
     cli.NO_FIGURE,
     cli.flag("--pdf", "draw NAME.pdf too"),
     cli.VERBOSE,
@@ -556,7 +557,8 @@ def solve(options: argparse.Namespace) -> int:
         facts = summary_dict(solution, path if saved else None, stated.reference, bound)
         lines = summary_lines(solution, stated.reference, verbose=options.verbose)
         gap = gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)
-        cli.tell(options, facts, [*lines, gap], records)
+        if not options.json:
+            cli.tell(options, facts, [*lines, gap], records)
         if saved and not options.no_figure and ended:
             from colloc.pictures.style import save as save_figure
 
@@ -564,8 +566,23 @@ def solve(options: argparse.Namespace) -> int:
                 line.say("drawing")
                 figure, kinds = solution.plot(), ("png", "pdf")[: 1 + options.pdf]
                 saved += map(str, save_figure(figure, path.with_suffix(""), kinds))
-    if saved and not options.json:
-        print(f"  saved {', '.join(saved)}")
+        if saved and not options.json:
+            print(f"  saved {', '.join(saved)}", flush=True)
+        if options.front and not solution.success:
+            cli.complain("no front, as the answer is not certified.")
+        elif options.front:
+            from colloc.commands.front import find_front
+            from colloc.search.options import OPTIONS
+
+            with complaining("no front"):
+                how = {"best": solution, "starts": OPTIONS.reach_starts}
+                table = path.with_suffix(".front.csv")
+                _, facts["front"], lines, more = find_front(options, stated, table, **how)
+                records += more
+                if not options.json:
+                    cli.tell(options, facts, lines, more)
+        if options.json:
+            cli.tell(options, facts, [], records)
     if not ended:
         complaints.append("interrupted; the same command goes on from there.")
     for complaint in complaints:

@@ -239,7 +239,7 @@ def objective_from(stated: object) -> Objective:
 
 
 def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:
-    """Objectives and their least values, from a mapping or pairs."""
+    """Objectives and their least values, from a mapping or pairs; the largest one of each."""
     pairs = stated.items() if isinstance(stated, Mapping) else () if stated is None else stated
     if not isinstance(pairs, Iterable) or not all(
         isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in pairs
@@ -248,9 +248,11 @@ def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:
             f"at_least names what must be reached with its value, as {{'distance': 0.3}}, not "
             f"{shown(stated)}."
         )
-    values = []
+    values: dict[str, tuple[Objective, float]] = {}
     for what, least in pairs:
         if not is_number(least):
             raise ProblemError(f"at_least needs a finite number for {what!r}, not {least!r}.")
-        values.append((objective_from(what), float(least)))
-    return tuple(values)
+        aim = objective_from(what)
+        if aim.expression not in values or values[aim.expression][1] < least:
+            values[aim.expression] = aim, float(least)
+    return tuple(values.values())

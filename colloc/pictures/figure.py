@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -452,25 +452,24 @@ def _draw_mesh(axes: Axes, solution: Solution) -> None:
 def plot_front(front: ParetoFront, ax: Axes | None = None) -> Any:
     """Both objectives of every gait; in a figure of its own also the paths of the gaits in the
     plane of the first two joints."""
-    drawn: dict[str, Callable[[Axes], object]] = {"front": lambda axes: _draw_front(axes, front)}
+    drawn: dict[str, Callable[[Axes], object]] = {"front": lambda axes: draw_front(axes, front)}
     if front.problem.body.n_joint > 1:
-        drawn["gaits"] = lambda axes: _draw_gaits(axes, front)
+        drawn["gaits"] = lambda axes: draw_gaits(axes, front.points)
     return _plot(drawn, ax, "front", (7.2 if len(drawn) > 1 else 3.8, 3.4))
 
 
-def _draw_gaits(axes: Axes, front: ParetoFront) -> None:
-    last, what = front.points[-1].gait.angles(_T), front.problem.body.defaults.quantity
-    for point, colour in zip(front.points, snapshot_colours(len(front.points)), strict=True):
-        path = point.gait.angles(_T)
+def draw_gaits(axes: Axes, points: Sequence[Solution]) -> None:
+    last, what = points[-1].gait.angles(_T)[:2], points[-1].problem.body.defaults.quantity
+    for point, colour in zip(points, snapshot_colours(len(points)), strict=True):
+        path = point.gait.angles(_T)[:2]
         # a mirror image is the same gait
         mirror = np.abs(path + last).sum() < np.abs(path - last).sum()
-        axes.plot(*(-path if mirror else path)[:2], color=colour, lw=1.0)
+        axes.plot(*(-path if mirror else path), color=colour, lw=1.0)
     axes.set(xlabel=f"{what} 1  [rad]", ylabel=f"{what} 2  [rad]", aspect="equal")
 
 
-def _draw_front(axes: Axes, front: ParetoFront) -> None:
-    first, second = front.objectives
-    values, after = front.values, [gap.after + 1 for gap in front.gaps]
+def draw_front(axes: Axes, front: ParetoFront) -> None:
+    ((first, second), values), after = front.in_units, [gap.after + 1 for gap in front.gaps]
     whole = np.insert(values, after, np.nan, axis=0)
     axes.plot(whole[:, 1], whole[:, 0], "-", color=BLUE, lw=0.8, zorder=1)
     for k in after:
@@ -478,7 +477,7 @@ def _draw_front(axes: Axes, front: ParetoFront) -> None:
         ends = values[k - 1 : k + 1].T[::-1]
         axes.plot(*ends, ":", color=VERMILION, lw=0.8, zorder=1, label=label)
     axes.scatter(values[:, 1], values[:, 0], c=snapshot_colours(len(front.points)), s=28, zorder=2)
-    axes.set(xlabel=second.label, ylabel=first.label)
+    axes.set(xlabel=second, ylabel=first)
     axes.set_title(front.problem.name)
     if after:
         axes.legend()

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Mapping
 from contextlib import suppress
 from io import StringIO
 from pathlib import Path
@@ -23,12 +24,22 @@ from colloc.mechanics.floor_contact import FOOT, PAD, WHEEL
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.inertia import GRAVITY
 from colloc.pictures import render
-from colloc.pictures.figure import Panel, mesh_errors, panels, robot_panels
+from colloc.pictures.figure import (
+    COLUMN,
+    Panel,
+    draw_front,
+    draw_gaits,
+    mesh_errors,
+    panels,
+    robot_panels,
+)
 from colloc.pictures.movie import Frames, frames
 from colloc.pictures.style import INK, figure_style
+from colloc.results.comparison import compare, verdict
 from colloc.results.motion import foot_kinds, hinges
 from colloc.results.robot import SLOW_ENOUGH, RobotSheet, in_si
 from colloc.results.solution import SOLVED, Solution
+from colloc.studies.families import ParetoFront
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import write_text
@@ -54,8 +65,11 @@ def report_page(
     gap: str = "",
     *,
     robot: RobotSheet | None = None,
+    front: ParetoFront | None = None,
+    beside: Solution | None = None,
 ) -> str:
-    """The page with what exists; `gap` is a sentence about the upper bound, `robot` a section."""
+    """The page with what exists; `gap` is a sentence about the upper bound, `robot`, `front` and
+    another result `beside` this one are sections."""
     problem, certificate = solution.problem, solution.certificate
     names, replayed = problem.body.defaults, certificate.replayed
     drawn, slow, dry, floor = panels(solution), 0.0, "", list[list[str]]()
@@ -90,6 +104,10 @@ def report_page(
         fields={name: json.dumps(value) for name, value in problem.to_dict().items()},
         source=solution.source or problem_file_text(problem),
         motion=_motion_data(frames(solution), problem.body),
+        beside=[
+            *([_comparison_section(solution, beside)] if beside else []),
+            *([_front_section(front)] if front else []),
+        ],
         toy=_toy(problem.body, problem.law),
         errors=float(mesh_errors(solution).sum()),
         gait_pictures=[
@@ -117,15 +135,14 @@ def write_report(
     path: Path,
     reference: Reference | None = None,
     known: Path | None = None,
-    *,
-    robot: RobotSheet | None = None,
+    **sections: Any,
 ) -> Path:
     """Write the page; `known` is the folder of upper bounds, by default that of the page."""
     gap = ""
     if solution.certificate.replayed:
         bound = upper_bound(solution.problem, known or path.parent, compute=False)
         gap = gap_line(solution.problem, solution.certificate.efficiency, bound)
-    write_text(path, report_page(solution, reference, gap, robot=robot))
+    write_text(path, report_page(solution, reference, gap, **sections))
     return path
 
 
@@ -216,13 +233,75 @@ def _motion_data(shown: Frames, body: Body) -> dict[str, Any]:
     }
 
 
+def _front_section(front: ParetoFront) -> dict[str, Any]:
+    """Table, pictures and films of a front."""
+    points, (names, values) = front.points, front.in_units
+    why, rows = {gap.after: gap.why for gap in front.gaps}, list[tuple[str, ...]]()
+    for k, (point, numbers) in enumerate(zip(points, values, strict=True)):
+        swings = ", ".join(f"{math.degrees(swing):.0f}" for swing in point.swings)
+        rows.append((f"{k:02d}", *(f"{x:.5g}" for x in numbers), swings, point.status))
+        if k in why:
+            rows.append((f"nothing found between: {why[k]}",))
+    drawn = [_picture(Panel(COLUMN, 3.2, lambda axes: draw_front(axes, front)), "the front")]
+    if front.problem.body.n_joint > 1:
+        gaits = Panel(COLUMN, 3.2, lambda axes: draw_gaits(axes, points))
+        drawn.append(_picture(gaits, "their gaits"))
+    return {
+        "title": f"{front.objectives[0].name} against {front.objectives[1].name}".capitalize(),
+        "pictures": drawn,
+        "head": ("gait", *names, "joints move by [deg]", "status"),
+        "rows": rows,
+        "films": _films({f"{k:02d}": point for k, point in enumerate(points)}),
+        "note": "",
+    }
+
+
+def _comparison_section(solution: Solution, other: Solution) -> dict[str, Any]:
+    """Table, pictures and films of two results."""
+    both, (rows, changes) = (solution, other), compare(solution, other)
+    _, sentence = verdict(solution, other)
+    names = [each.problem.name for each in both]
+    if names[0] == names[1]:
+        names = [f"{name} ({k})" for k, name in enumerate(names, 1)]
+    drawn = []
+    if all(each.problem.body.n_joint > 1 for each in both):
+        plane = Panel(COLUMN, 3.2, lambda axes: draw_gaits(axes, both))
+        drawn = [_picture(plane, f"{names[0]} (light), {names[1]} (dark)")]
+    courses = (panels(each)["angles"] for each in both)
+    drawn += [_picture(panel, name) for panel, name in zip(courses, names, strict=True)]
+    return {
+        "title": f"Beside {names[1]}",
+        "pictures": drawn,
+        "head": ("", *names),
+        "rows": [*rows, *((f"problem: {name}", *values) for name, *values in changes)],
+        "films": _films(dict(zip(names, both, strict=True))),
+        "note": sentence[:1].upper() + sentence[1:],
+    }
+
+
+def _films(solutions: Mapping[str, Solution]) -> list[tuple[str, Markup]]:
+    """Films of solutions by their names, at the scale at which the widest fits."""
+    shown = {name: _film(each) for name, each in solutions.items()}
+    scale = min(min(_FILM / np.ptp(each.window, axis=0)) for each in shown.values())
+    return [
+        (name, Markup(_card(each, shown[name], scale, film_alone=True)))
+        for name, each in solutions.items()
+    ]
+
+
 def solution_card(solution: Solution) -> str:
     """A card with two periods from above, as points of an animated SVG, and the numbers."""
-    body = solution.problem.body
-    shown = frames(solution, _FILM_FRAMES + 1, arrows=1, periods=_FILM_PERIODS)
+    shown = _film(solution)
+    return _card(solution, shown, min(_FILM / np.ptp(shown.window, axis=0)))
+
+
+def _film(solution: Solution) -> Frames:
+    return frames(solution, _FILM_FRAMES + 1, arrows=1, periods=_FILM_PERIODS)
+
+
+def _card(solution: Solution, shown: Frames, scale: float, *, film_alone: bool = False) -> str:
+    body, (low, high) = solution.problem.body, shown.window
     points = np.linspace(0, len(shown.ends[0]) - 1, min(30, len(shown.ends[0]))).round().astype(int)
-    low, high = shown.window
-    scale = min(_FILM / (high - low))
 
     def texts(places: np.ndarray) -> list[str]:
         """Points ``(2, n_point, n_time)`` of every frame of all periods; y points down."""
@@ -237,6 +316,7 @@ def solution_card(solution: Solution) -> str:
     return render(
         "card.html",
         solution=solution,
+        film_alone=film_alone,
         foot_words=_foot_words(body),
         size=np.ceil(scale * (high - low)).astype(int),
         width=max(scale * link_width(body), 4.0),

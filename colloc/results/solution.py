@@ -349,9 +349,18 @@ class Solution:
         return higher("pictures.movie:write_movie")(self, Path(path), **options)
 
     @checked_arguments
-    def report(self, path: str | os.PathLike[str], *, robot: Any = None) -> Path:
-        """Write the web page of `colloc report`; with what `robot` returns also its sheet."""
-        return higher("pictures.report_page:write_report")(self, Path(path), robot=robot)
+    def report(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        robot: Any = None,
+        front: Any = None,
+        beside: Solution | None = None,
+    ) -> Path:
+        """Write the web page of `colloc report`; with what `robot` and `colloc.pareto_front` return
+        also those, and with another solution `beside` this one."""
+        sections = {"robot": robot, "front": front, "beside": beside}
+        return higher("pictures.report_page:write_report")(self, Path(path), **sections)
 
     @checked_arguments
     def export(self, path: str | os.PathLike[str], **options: Any) -> dict[str, Any]:

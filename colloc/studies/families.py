@@ -1,8 +1,8 @@
 """Families of certified gaits, each solved from its neighbours.
 
-Pareto fronts by the epsilon-constraint method: between its ends, the first objective is maximised
-at evenly spaced values of the second, from both neighbours. Where neighbours are too far apart,
-points are added halfway; what stays empty is a gap.
+Pareto fronts by the epsilon-constraint method, from their ends inwards: where neighbours are widest
+apart in an objective, the other one is maximised at a level between, from the neighbour that
+reaches it. What is no better than these leaves a gap. Only the gaits that are left are certified.
 
 Steering: the best gait for every turn per period. After the straight gait, others are sought in
 the class without symmetry, each from its neighbour, or from the mirror image of the opposite turn.
@@ -11,31 +11,44 @@ Controllers can interpolate between neighbours.
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import one_sided
-from colloc.gaits.objective import EFFICIENCY, SPEED, Objective, objective_from
+from colloc.gaits.objective import DRIVEN, Objective, objective_from
 from colloc.gaits.period import Period
 from colloc.gaits.problem import Problem
+from colloc.gaits.regime import Free
+from colloc.gaits.robot import BATTERY
 from colloc.gaits.symmetry import ANTIPODAL, NONE
 from colloc.results.solution import Solution
-from colloc.search.options import OPTIONS
+from colloc.results.store import load
+from colloc.search.explore import with_reachable_distance
+from colloc.search.iterate import space_near
+from colloc.search.optimise import optimise
+from colloc.search.options import MEDIUM, OPTIONS
 from colloc.studies.solve import solve_member
 from colloc.system.arguments import check_count, is_number
 from colloc.system.environment import higher
-from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 from colloc.verification.replay import replayer
 
 _MOST_POINTS = 1000
-_BETTER = 1e-6  # relative gain for which a point is replaced
-_CLOSE, _APART = 0.1, 2.0  # spacing of duplicates, and of gaps, over the even one
+# over the even spacing: duplicates, neighbours between which a gait is sought, and gaps
+_CLOSE, _WIDE, _APART = 0.1, 1.9, 2.0
+_SAME = 1e-3  # relative difference in both objectives up to which two gaits are one
+_ROUGH = 3e-5  # relative error of an optimum on the mesh of another gait
+_WAYS = Objective("distance"), Objective("distance / period", name="speed")
 _LEAST_WORK = Objective("1 / work", "least work")  # turning on the spot: moving takes work
 _PHASES = 1000  # tried for the begin of a gait
 
@@ -67,6 +80,17 @@ class ParetoFront:
         return np.array([_measure(point, self.objectives)[0] for point in self.points])
 
     @property
+    def in_units(self) -> tuple[tuple[str, str], np.ndarray]:
+        """Labels of both objectives and their values, ``(n, 2)``; of a robot cm/s and J/m."""
+        (first, second), robot, values = self.objectives, self.problem.robot, self.values
+        if robot is None or first not in _WAYS or second.name not in (BATTERY, DRIVEN.name):
+            return (first.label, second.label), values
+        pressing, (way, thrift) = robot.pressing(self.problem.grade), values.T
+        unit: Any = robot.period if first == _WAYS[0] else math.sqrt(robot.length / pressing)
+        speed, energy = 100 * robot.length * way / unit, robot.mass * pressing / thrift
+        return ("speed [cm/s]", "energy [J/m]"), np.transpose([speed, energy])
+
+    @property
     def certified(self) -> bool:
         """True if the gaits that were found in its gaps are certified, too."""
         return all(gap.certified for gap in self.gaps)
@@ -82,12 +106,24 @@ class ParetoFront:
         return f"<ParetoFront of {self.problem.name}: {first} against {second}, {counts}>"
 
 
+@dataclass(eq=False)
+class _Point:
+    """A gait of a front: a solution, or an optimum of a problem, not yet certified."""
+
+    values: np.ndarray  # (2,)
+    errors: np.ndarray
+    gait: AnyGait
+    edges: np.ndarray  # of a mesh that is fine enough for such gaits
+    source: Solution | Problem
+
+
 def pareto_front(
     problem: Problem,
-    first: Objective | str = SPEED,
-    second: Objective | str = EFFICIENCY,
-    points: int = 9,
+    first: Objective | str | None = None,
+    second: Objective | str | None = None,
+    points: int = 5,
     *,
+    best: Solution | None = None,
     starts: int = OPTIONS.starts,
     progress: Callable[[int, Solution], object] | None = None,
 ) -> ParetoFront:
@@ -96,16 +132,19 @@ def pareto_front(
     Parameters
     ----------
     problem : Problem
-        Its own objective does not matter; its constraints hold for every point.
-    first, second : Objective or str
-        As for `colloc.gaits.problem.Problem`.
+        Its constraints hold for every point.
+    first, second : Objective or str, optional
+        As for `colloc.gaits.problem.Problem`. By default distance, of a robot whose period is free
+        speed, and the problem's own objective.
     points : int
-        At least 2, evenly spaced in the second objective. Dominated points and duplicates are left
-        out; what fills gaps is added.
+        At least 2, and more until neighbours lie no farther apart than twice the even spacing, in
+        either objective. Dominated points and duplicates are left out.
+    best : Solution, optional
+        The certified best gait by the second objective, if it is known; its problem counts then.
     starts : int
-        Starting points for both ends, and in gaps that no neighbour leads into.
+        Starting points for both ends.
     progress : callable, optional
-        Called with the number of a point and its solution, also when it is replaced.
+        Called with the number of gaits certified so far and the last one.
 
     Raises
     ------
@@ -117,84 +156,107 @@ def pareto_front(
     Examples
     --------
     >>> import colloc
-    >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
+    >>> floor, gait = colloc.Friction(mu_t=10), colloc.Harmonic(1, "bilateral")
+    >>> problem = colloc.Problem("quick", friction=floor, gait=gait, delta=1e-2)
     >>> colloc.pareto_front(problem, "speed", "efficiency", 3, starts=1)
     <ParetoFront of quick: speed against efficiency, 3 certified points, 0 gaps>
     """
+    problem = best.problem if best else problem
     if not problem.gait.free:
         raise ProblemError("nothing is free in a prescribed motion: it is one point, and no front.")
-    aims = objective_from(first), objective_from(second)
+    way = _WAYS[isinstance(problem.froude, Free)]
+    aims = objective_from(first or way), objective_from(second or problem.objective)
     if aims[0].expression == aims[1].expression:
         raise ProblemError(f"a front needs two objectives, not {aims[0].name} twice.")
     check_count(starts=starts)
     if not 2 <= points <= _MOST_POINTS:
         raise ProblemError(f"a front has 2 to {_MOST_POINTS} points, not {points}.")
-    last = points - 1
-    solutions: dict[int, Solution] = {}
+    reachable = with_reachable_distance(problem)
+    stated, intervals, certified = reachable.with_(least_distance=None), points - 1, list[_Point]()
 
-    def keep(k: int, solution: Solution) -> None:
-        value, before = solution.measured.value, solutions.get(k)
-        if before is None or (solution.success, value) > (
-            before.success,
-            before.measured.value + _BETTER * abs(value),
-        ):
-            solutions[k] = solution
-            if progress is not None:
-                progress(k, solution)
+    def add(solution: Solution) -> None:
+        values, errors = _measure(solution, aims)
+        certified.append(_Point(values, errors, solution.gait, solution.answer.edges, solution))
+        if progress is not None:
+            progress(len(certified), solution)
 
-    def reach(which: int, level: float, begin: Solution | None) -> Solution:
-        """Maximise one objective where the other reaches a level, from a gait or from starts."""
-        limits = (*problem.at_least, (aims[which], level))
-        stated = problem.with_(objective=aims[1 - which], at_least=limits)
-        if begin is None:
-            return solve_member(stated, starts)
-        return solve_member(stated.with_(guess=begin.gait, delta_start=problem.delta), 1)
+    def optimum(which: int, level: float, near: _Point) -> _Point:
+        """The best by one objective, from a gait, where the other reaches a level."""
+        at_least = *stated.at_least, (aims[which], level)
+        asked = stated.with_(objective=aims[1 - which], at_least=at_least, delta_start=stated.delta)
+        space, v = space_near(asked, near.gait, near.edges)
+        end = optimise(space, v, asked.delta, MEDIUM)
+        if end.violation > MEDIUM:
+            raise NotConvergedError("no gait was found there")
+        period = end.program().period(end.v)
+        values = np.array([aim(period) for aim in aims])
+        return _Point(values, _ROUGH * np.abs(values), end.gait, near.edges, asked)
 
-    for k, aim in zip((0, last), aims, strict=True):
-        keep(k, solve_member(problem.with_(objective=aim), starts))
-        if not solutions[k].success:
+    # the best by the second objective first: of two gaits that nobody can tell apart it stays
+    for k, end in ((1, best), (0, None)):
+        end = end or solve_member(stated.with_(objective=aims[k]), starts)
+        if not end.success:
             raise ProblemError(
-                f"the gait of best {aim.name} is not certified, so there is no front: "
-                f"{solutions[k].message}"
+                f"the gait of best {aims[k].name} is not certified, so there is no front: "
+                f"{end.message}"
             )
-    if len(_thin(solutions.values(), aims, last)) > 1:
-        lowest, highest = (float(_measure(solutions[k], aims)[0][1]) for k in (0, last))
-        levels = np.linspace(lowest, highest, points).tolist()
-        backwards = range(last - 1, 0, -1)
-        for k in backwards:
-            keep(k, reach(1, levels[k], solutions[k + 1]))
-        for k in range(1, last):
-            keep(k, reach(1, levels[k], solutions[k - 1]))
-        for k in backwards:  # a point that is dominated by the next one
-            here, beside = (_measure(solutions[j], aims)[0][0] for j in (k, k + 1))
-            if beside > here:
-                keep(k, reach(1, levels[k], solutions[k + 1]))
-    front, empty = _thin(solutions.values(), aims, last), {}
+        add(end)
+    known, empty = [*certified], set[tuple[_Point, _Point]]()
     for _ in range(2 * points):
-        wide = {pair: size for pair, size in _wide(front, aims, last).items() if pair not in empty}
+        apart = _apart(_thin(known, intervals), intervals)
+        least = _WIDE if len(apart) >= intervals else 1.0
+        wide = {pair: x for pair, x in apart.items() if pair not in empty and x.max() > least}
         if not wide:
             break
         pair = max(wide, key=lambda each: wide[each].max())
-        which, attempts, failure = int(wide[pair].argmax()), [], ""
-        level = 0.5 * sum(float(_measure(each, aims)[0][which]) for each in pair)
-        for begin in (*pair, None):
-            if begin is None and pair not in pairwise(front):
-                break  # a neighbour led into the gap
+        for which in np.argsort(-wide[pair]).tolist():  # the other one if the front jumps there
+            parts = max(2, round(wide[pair][which]))
+            begin, end = (each.values[which] for each in pair)
+            level = float(begin + parts // 2 / parts * (end - begin))
+            with suppress(CollocError):
+                known.append(optimum(which, level, pair[which]))
+            if pair not in pairwise(_thin(known, intervals)):
+                break
+        else:
+            empty.add(pair)
+    failed = list[tuple[_Point, str]]()
+    for point in _thin(known, intervals):
+        if isinstance(asked := point.source, Problem):
             try:
-                attempts.append(reach(which, level, begin))
-            except NotConvergedError as error:
-                failure = str(error)
+                solution = solve_member(asked.with_(guess=point.gait), 1)
+            except CollocError as error:
+                failed.append((point, str(error)))
                 continue
-            keep(len(solutions), attempts[-1])
-            front = _thin(solutions.values(), aims, last)
-        if attempts:
-            failure = "" if any(each.success for each in attempts) else attempts[0].message
-        empty[pair] = failure or "the best gaits found there are those beside it", not failure
-    unknown, wide = ("not sought: ask for more points", True), _wide(front, aims, last)
-    gaps = (
-        Gap(k, *empty.get(pair, unknown)) for k, pair in enumerate(pairwise(front)) if pair in wide
-    )
-    return ParetoFront(problem, aims, tuple(front), tuple(gaps))
+            if solution.success:
+                add(solution)
+            else:
+                failed.append((point, solution.message))
+    front, gaps = _thin(certified, intervals), list[Gap]()
+    for k, ((a, b), width) in enumerate(_apart(front, intervals).items()):
+        if width.max() > _APART:
+            between = (why for each, why in failed if a.values[0] > each.values[0] > b.values[0])
+            why = next(between, "")
+            gaps.append(Gap(k, why or "the best gaits met there are those beside it", not why))
+    solutions: Any = (point.source for point in front)
+    return ParetoFront(reachable, aims, tuple(solutions), tuple(gaps))
+
+
+def read_front(table: Path, problem: Problem) -> ParetoFront | None:
+    """The front in a table of `colloc solve --front` or `colloc pareto`, if the best gait of the
+    problem is one of its ends."""
+    with table.open(newline="") as lines:
+        rows = [*csv.DictReader(lines)]
+    if not rows or "file" not in rows[0]:
+        return None
+    points = tuple(load(table.with_suffix("") / Path(row["file"]).name) for row in rows)
+    problems = [point.problem for point in points]
+    if problem.hash not in (each.hash for each in problems):
+        return None
+    every = (aim for each in problems for aim in (each.objective, *dict(each.at_least)))
+    known = {aim.expression: aim for aim in (*_WAYS, *every)}
+    first, second = (known.get(name) or Objective(name) for name in [*rows[0]][1:3])
+    gaps = (Gap(k, row["gap"], True) for k, row in enumerate(rows) if row.get("gap"))
+    return ParetoFront(problem, (first, second), points, tuple(gaps))
 
 
 @lru_cache(maxsize=256)
@@ -213,34 +275,30 @@ def _measure(solution: Solution, aims: Objectives) -> np.ndarray:
     return np.transpose(measured)
 
 
-def _thin(solutions: Iterable[Solution], aims: Objectives, intervals: int) -> list[Solution]:
-    """Non-dominated certified solutions (by more than the errors), without near duplicates."""
-    front: list[Solution] = []
-    for each in (solution for solution in solutions if solution.success):
-        (values, errors), others = _measure(each, aims), [_measure(other, aims) for other in front]
-        if any((values <= other + errors + error).all() for other, error in others):
+def _thin(points: Iterable[_Point], intervals: int) -> list[_Point]:
+    """The points that no other dominates (by more than the errors), without near duplicates."""
+    front: list[_Point] = []
+    for each in points:
+        values, errors = each.values, each.errors
+        if any((values <= other.values + other.errors + errors).all() for other in front):
             continue
-        left = [
-            point
-            for point, (other, error) in zip(front, others, strict=True)
-            if (values < other - errors - error).any()
-        ]
-        close = np.ptp([values, *(other for other, _ in others)], axis=0) * _CLOSE / intervals
-        if len(left) == len(front) > 1 and any(
-            (abs(values - other) < close).all() for other, _ in others
-        ):
-            continue
-        front = [*left, each]
-    return sorted(front, key=lambda each: -_measure(each, aims)[0][0])
+        left = [p for p in front if (values < p.values - p.errors - errors).any()]
+        spread = np.ptp([values, *(other.values for other in front)], axis=0)
+        close = np.maximum(spread * _CLOSE / intervals, _SAME * np.abs(values))
+        twins = ((np.abs(values - other.values) < close).all() for other in front)
+        if len(left) < len(front) or not any(twins):
+            front = [*left, each]
+    return sorted(front, key=lambda each: -each.values[0])
 
 
-def _wide(
-    front: list[Solution], aims: Objectives, intervals: int
-) -> dict[tuple[Solution, Solution], np.ndarray]:
-    """Neighbours that are too far apart, and their distance in each objective over the front's."""
-    apart = np.abs(np.diff([_measure(each, aims)[0] for each in front], axis=0))
-    shares = zip(pairwise(front), apart / apart.sum(axis=0), strict=True)
-    return {pair: size for pair, size in shares if size.max() * intervals > _APART}
+def _apart(front: list[_Point], intervals: int) -> dict[tuple[_Point, _Point], np.ndarray]:
+    """Neighbours and their distance in each objective over the even spacing; 0 in an objective in
+    which nobody can tell the ends apart."""
+    values = np.array([each.values for each in front])
+    spread = np.ptp(values, axis=0)
+    told = spread > OPTIONS.close * np.abs(values).max(axis=0)
+    apart = np.abs(np.diff(values, axis=0)) * np.where(told, 1.0, 0.0) / np.where(told, spread, 1.0)
+    return dict(zip(pairwise(front), intervals * apart, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ import pytest
 from colloc import Chain, Fourier, Friction, Problem, Solution, save
 from colloc.commands import results as recheck
 from colloc.results import checks
+from colloc.results.comparison import gait_distance
 
 
 def test_verify_certifies_without_loading_casadi_or_matplotlib(three_link, tmp_path):
@@ -109,17 +110,17 @@ def test_gaits_are_compared_where_start_phase_and_the_symmetries_of_body_and_fri
 
     # the mirror image, begun elsewhere
     gait, later = (found(mean, cos, sin), found(-mean, -sin, cos))
-    assert recheck.gait_distance(gait, later) < 1e-9
+    assert gait_distance(gait, later) < 1e-9
     turned = -mean[::-1], -cos[::-1], -sin[::-1]
     others = {"turned": turned, "backwards": (mean, cos, -sin), "both": (*turned[:2], -turned[2])}
     assert {
-        name for name, other in others.items() if recheck.gait_distance(gait, found(*other)) < 1e-9
+        name for name, other in others.items() if gait_distance(gait, found(*other)) < 1e-9
     } == alike
 
 
 def test_the_same_gait_found_for_another_objective_is_not_the_same_optimum(three_link):
     other = SimpleNamespace(problem=Problem("p", body=Chain((0.2, 0.5, 0.3))))
-    assert recheck.gait_distance(three_link, other) is None  # of another body
+    assert gait_distance(three_link, other) is None  # of another body
     fast = replace(three_link, problem=three_link.problem.with_(objective="speed"))
     assert recheck.verdict(three_link, fast) == (False, "other objectives: efficiency and speed.")
 

@@ -74,6 +74,17 @@ def page(three_link):
     return report_page(three_link, Reference(0.259, 0.0015, "the paper"), "upper bound 0.473")
 
 
+def test_another_result_stands_beside_it(three_link):
+    slower = replace(three_link, problem=three_link.problem.with_(name="other"), seconds=987.0)
+    seen = outline(report_page(three_link, beside=slower))
+    text = " ".join(seen.text)
+    assert "Beside other" in text
+    assert "The same optimum: efficiencies differ by 0 %" in text
+    assert "987.0" in text
+    films = [value for tag, name, value in seen.attributes if (tag, name) == ("svg", "aria-label")]
+    assert {f"{x} as it moves, two periods" for x in ("three_link", "other")} <= {*films}
+
+
 def test_the_page_needs_no_network_and_no_other_file(page):
     seen, links = outline(page), ("src", "srcset", "href", "action", "background", "poster")
     for tag, name, value in seen.attributes:

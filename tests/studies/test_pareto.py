@@ -1,6 +1,7 @@
 """A front of two objectives: no gait of it is better in both, and its ends are the best by one
 alone."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +14,16 @@ from colloc import (
     Harmonic,
     Objective,
     Problem,
+    Robot,
     evaluate,
+    load,
     pareto_front,
     replay,
 )
+from colloc.commands.main import main
 from colloc.pictures.figure import plot_front
 from colloc.search.solve import solve
-from colloc.studies.families import Gap, ParetoFront
+from colloc.studies.families import Gap, ParetoFront, read_front
 
 USUAL = {"gait": Harmonic(1, "bilateral"), "mesh_tolerance": 1e-4}
 PROBLEM = Problem("wide", friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=1e-2, **USUAL)
@@ -27,7 +31,7 @@ PROBLEM = Problem("wide", friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=1e-2
 
 @pytest.fixture(scope="module")
 def front():
-    return pareto_front(PROBLEM, points=4, starts=1)
+    return pareto_front(PROBLEM, "speed", "efficiency", points=4, starts=1)
 
 
 def test_the_front_is_monotone_and_every_point_is_certified(front):
@@ -58,7 +62,8 @@ def test_points_differ_and_what_lies_empty_is_listed():
     assert (np.diff(front.values, axis=0) * [-1, 1] > 1e-6).all()
     shares = apart(front).max(axis=1)
     assert shares.min() > 0.02
-    assert [gap.after for gap in front.gaps] == [0] == np.flatnonzero(shares > 0.5).tolist()
+    (empty,) = np.flatnonzero(shares > 0.5)
+    assert [gap.after for gap in front.gaps] == [empty]
 
 
 def test_the_figure_draws_no_line_over_a_gap(front):
@@ -82,18 +87,18 @@ def test_its_ends_are_the_best_by_one_objective_alone(front):
         assert front.values[at, k] == pytest.approx(alone.certificate.value, rel=1e-9)
 
 
-@pytest.mark.parametrize("signs", [(1, 1, 1, 1, 1), (-1, 1, -1, 1, 1), (1, -1, -1, -1, -1)])
+@pytest.mark.parametrize("signs", [(1, 1, 1, 1), (-1, 1, -1, 1), (1, -1, -1, -1)])
 def test_the_figure_draws_every_value_and_mirror_images_alike(front, signs):
     points = [
         replace(point, answer=replace(point.answer, gait=point.gait.scaled(sign)))
-        for sign, point in zip(signs, front.points, strict=True)
+        for sign, point in zip(np.resize(signs, len(front.points)), front.points, strict=True)
     ]
     values, plane = plot_front(replace(front, points=tuple(points))).axes
     np.testing.assert_array_equal(values.lines[0].get_xydata(), front.values[:, ::-1])
     *others, last = (line.get_xydata() for line in plane.lines)
     angles = points[-1].gait.angles(np.linspace(0.0, 1.0, len(last)))
     np.testing.assert_allclose(last.T, angles, atol=1e-12)
-    assert len(others) == len(signs) - 1
+    assert len(others) == len(front.points) - 1
     assert all(np.abs(path - last).sum() < np.abs(path + last).sum() for path in others)
 
 
@@ -111,3 +116,88 @@ def test_a_gait_that_turns_is_as_far_whether_its_certificate_knows_the_objective
     aims = Objective("distance"), Objective("distance * driven_work / driven_work")
     ((known, measured),) = ParetoFront(point.problem, aims, (point,)).values
     assert measured == pytest.approx(known, rel=1e-4)
+
+
+@pytest.fixture(scope="module")
+def from_the_answer():
+    """One foot on each of three links, as `colloc solve --front` does it."""
+    best = solve(FEET, 8)
+    return best, pareto_front(FEET, best=best, starts=8)
+
+
+FEET = Problem("feet", body=Chain(feet=1), gait=Harmonic(1, "bilateral"), delta=1e-3)
+
+
+@pytest.mark.slow
+def test_every_gait_is_as_far_and_as_efficient_by_replay(from_the_answer):
+    _, front = from_the_answer
+    assert all(point.success for point in front.points)
+    for point, values in zip(front.points, front.values, strict=True):
+        again = replay(FEET.body, FEET.law, point.gait, point.delta_per_period, instants=3000)
+        np.testing.assert_allclose(values, (again.distance, again.efficiency), rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_from_the_answer_to_the_farthest_none_is_dominated_and_all_differ(from_the_answer):
+    best, front = from_the_answer
+    farthest = solve(FEET.with_(objective="distance"), 32)
+    assert front.points[-1] is best
+    assert front.values[0, 0] == pytest.approx(farthest.distance, rel=1e-4)
+    assert 4 <= len(front.points) <= 8
+    assert (np.diff(front.values, axis=0) * [-1, 1] > 1e-3 * np.abs(front.values[1:])).any(1).all()
+    assert (np.diff(front.values, axis=0) * [-1, 1] > 0).all()
+    wide = np.flatnonzero(apart(front).max(axis=1) > 2 / 4)
+    assert [gap.after for gap in front.gaps] == wide.tolist()
+
+
+def test_a_robots_front_is_in_centimetres_a_second_and_joules_a_metre():
+    robot = Robot(length=0.5, mass=2, period=40, idle_power=0.02)
+    problem = Problem("robot", friction=Friction(0.3, 0.3, 0.3), robot=robot, delta=1e-2, **USUAL)
+    front = pareto_front(problem, points=2, starts=1)
+    names, numbers = front.in_units
+    assert names == ("speed [cm/s]", "energy [J/m]")
+    for point, (speed, energy) in zip(front.points, numbers, strict=True):
+        measured = replay(
+            problem.body,
+            problem.law,
+            point.gait,
+            point.delta_per_period,
+            quantities=["driven_work"],
+        )
+        way, unit = 0.5 * measured.distance, 2 * 9.81 * 0.5
+        assert speed == pytest.approx(100 * way / 40, rel=1e-5)
+        battery = unit * measured.values["driven_work"] + 0.02 * 40
+        assert energy == pytest.approx(battery / way, rel=1e-4)
+
+
+def test_of_a_quantity_that_is_asked_for_twice_the_larger_value_counts():
+    twice = PROBLEM.with_(at_least=[("distance", 0.1), ("distance", 0.2), ("work", 0.1)])
+    assert [least for _, least in twice.at_least] == [0.2, 0.1]
+
+
+@pytest.mark.slow
+def test_solve_leaves_a_front_that_the_report_shows(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "floor.py").write_text(ONE_FLOOR, encoding="utf-8")
+    assert main(["solve", "floor.py", "--front", "--starts", "2", "--json"]) == 0
+    front = json.loads(capsys.readouterr().out)["front"]
+    points = [load(row["file"]) for row in front["points"]]
+    assert points[-1].value == load("results/floor.h5").value
+    assert [row["distance"] for row in front["points"]] == [point.distance for point in points]
+    table = read_front(tmp_path / "results/floor.front.csv", points[-1].problem)
+    np.testing.assert_array_equal(table.values, [(p.distance, p.efficiency) for p in points])
+    assert [gap.after for gap in table.gaps] == [gap["after"] for gap in front["gaps"]]
+    assert main(["report", "results/floor.h5"]) == 0
+    page = (tmp_path / "results/floor.html").read_text(encoding="utf-8")
+    assert all(f"<td>{point.distance:.5g}</td>" in page for point in points)
+    # a front of another problem is none of this one
+    (tmp_path / "floor.py").write_text(ONE_FLOOR.replace("mu_t=10", "mu_t=9"), encoding="utf-8")
+    assert main(["solve", "floor.py", "--starts", "1", "--no-figure"]) == 0
+    assert main(["report", "results/floor.h5"]) == 0
+    assert "of another problem, and left out" in capsys.readouterr().err
+
+
+ONE_FLOOR = """
+from colloc import *
+PROBLEM = Problem("floor", friction=Friction(mu_t=10, mu_f=1, mu_b=1), gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-4)
+"""
