@@ -54,13 +54,34 @@ def test_totals_and_gradients_are_those_of_numpy(case, delta):
     np.testing.assert_allclose(compiled, reference, rtol=0, atol=1e-9 * scale.max())
 
 
-def test_instants_that_newton_loses_are_balanced_all_the_same():
+def five_links():
     problem = Problem("p", body=Chain((0.2,) * 5), friction=ROUGH, intervals=20)
     space, v = space_near(problem, problem.guess)
     angles, rates, pace = space.at(v)
     compiled = CompiledPeriod.of(space.control.dynamics, space.mesh)
-    shapes, rng = Shapes(angles, rates, 1e-4, pace=pace), np.random.default_rng(0)
-    rest = compiled.simulate(shapes, np.zeros((3, angles.shape[1])))
+    return compiled, Shapes(angles, rates, 1e-4, pace=pace), np.zeros((3, angles.shape[1]))
+
+
+def test_instants_that_newton_loses_are_balanced_all_the_same():
+    compiled, shapes, rest = five_links()
+    expected, *_ = compiled.simulate(shapes, rest)
     for size in (1.0, 100.0, np.nan):
-        wild = compiled.simulate(shapes, size * rng.normal(size=(3, angles.shape[1])))
-        np.testing.assert_allclose(wild[0], rest[0], rtol=0, atol=1e-8)
+        wild, *_ = compiled.simulate(
+            shapes, size * np.random.default_rng(0).normal(size=rest.shape)
+        )
+        np.testing.assert_allclose(wild, expected, rtol=0, atol=1e-8)
+
+
+def test_a_body_whose_joints_rest_rests():
+    compiled, shapes, rest = five_links()
+    expected, *_ = compiled.simulate(shapes, rest)
+    shapes.rates[:, ::7] = 0.0
+    z, out, _ = compiled.simulate(shapes, rest)
+    assert not np.vstack([z, out])[:, ::7].any()
+    np.testing.assert_allclose(z[:, 1:7], expected[:, 1:7], rtol=0, atol=1e-8)
+
+
+def test_a_shape_that_is_no_number_has_no_motion():
+    compiled, shapes, rest = five_links()
+    shapes.angles[1, 5] = np.nan
+    assert compiled.simulate(shapes, rest) is None

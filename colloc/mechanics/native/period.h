@@ -245,7 +245,6 @@ static inline void pull_to_shape(
     }
     for (int i = 0; i < 3; ++i)
         multiplier[i] = inverse[0][i] * on_z[0] + inverse[1][i] * on_z[1] + inverse[2][i] * on_z[2];
-    Lanes all = ZERO;
     for (int i = 0; i < n; ++i) {
         const Lanes c = link[i].cos, s = link[i].sin;
         const Lanes ux = multiplier[0] - multiplier[2] * link[i].y, uy = multiplier[1] + multiplier[2] * link[i].x;
@@ -271,11 +270,9 @@ static inline void pull_to_shape(
             }
         }
     }
-    for (int i = 0; i < n; ++i)
-        all += on_rate[i];
     Lanes phi = ZERO, rate = ZERO;
-    for (int j = n - 2; j >= 0; --j) {
+    for (int j = n - 2; j >= 0; --j) { /* a joint turns all links ahead; turning all of them changes nothing, by the balance */
         phi += on_phi[j + 1], rate += on_rate[j + 1];
-        on_shape[j] = phi, on_shape[n - 1 + j] = j < reference ? rate - all : rate;
+        on_shape[j] = phi, on_shape[n - 1 + j] = rate;
     }
 }
