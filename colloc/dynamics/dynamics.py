@@ -44,8 +44,8 @@ from colloc.mechanics.native_kernel import kernel_repeating, native_kernel
 from colloc.numerics.mesh import Mesh
 
 _MOMENTA, _MORE = slice(len(STATES)), slice(-len(STATES), None)
-_VISCOUS, _WETTER = 3.0, 10**0.5
-"""Delta at which friction is as good as viscous, and the factor between deltas."""
+_VISCOUS, _WETTER, _LEAST_RATIO = 3.0, 10**0.5, 1.02
+"""Delta at which friction is as good as viscous, and the largest and the smallest factor between deltas."""
 _TOLERANCE, _BALANCED = 1e-12, 1e-9
 """Residual at which balances are solved, and where rounding may stop the solver."""
 OMEGA, OUTPUTS = 2, slice(2, None)
@@ -391,6 +391,8 @@ class Inertial(QuasiStatic):
             at_first = momenta(self.chain, posture, link)
             near_states = np.concatenate([at_first, slow.states]) if slow.states.size else at_first
         states, out, held = self._periodic_states(mesh, shapes, near_states, static)
+        if not held and near_z is not None:  # from one that is known to another that jumps there
+            return self.simulate(mesh, shapes, static)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
         gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
@@ -413,13 +415,20 @@ class Inertial(QuasiStatic):
         self, mesh: Mesh, shapes: Shapes, near: np.ndarray, static: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
         """Periodic states, outputs, and whether they exist. Where Newton's method fails from
-        `near`, as on sticking feet, by continuation through more viscous friction."""
-        found = self._newton(mesh, shapes, near, static)
-        if found[-1] or shapes.delta * shapes.unit > _VISCOUS:
-            return found
-        more = shapes._replace(delta=_WETTER * shapes.delta)
-        wetter = self._periodic_states(mesh, more, near, static)
-        return self._newton(mesh, shapes, wetter[0], static) if wetter[-1] else wetter
+        `near`, as on sticking feet, by continuation through more viscous friction, in steps that
+        shrink where it fails again, as where one wheel after another begins to slip."""
+        found, delta, ratio = self._newton(mesh, shapes, near, static), shapes.delta, _WETTER
+        while not found[-1] and delta * shapes.unit <= _VISCOUS:
+            delta *= _WETTER
+            found = self._newton(mesh, shapes._replace(delta=delta), near, static)
+        while found[-1] and delta > shapes.delta:
+            drier = max(delta / ratio, shapes.delta)
+            further = self._newton(mesh, shapes._replace(delta=drier), found[0], static)
+            if not further[-1] and ratio > _LEAST_RATIO:
+                ratio **= 0.5
+            else:
+                found, delta, ratio = further, drier, min(ratio**2, _WETTER)
+        return found
 
     def _newton(
         self, mesh: Mesh, shapes: Shapes, near: np.ndarray, static: np.ndarray
