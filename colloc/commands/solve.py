@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
     from colloc.gaits.robot_model import Model
 
-_ROLLING = 0.02  # coefficient of friction of a wheel along
+_ROLLING = 0.05  # resistance of a small wheel on a plain bearing, over its load
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
 _LARGEST, _ALIKE = 3.14, 1e-6  # angle of a joint [rad], difference of like densities
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180}
@@ -45,14 +45,18 @@ EXIT = {
     CERTIFICATE_FAILED: FAILED,
     INTERRUPTED: CODE_INTERRUPTED,
 }
-_WHEELS = "tuple(Wheel(link, rolling={rolling:g}, sideways={mu:g}) for link in range({links}))"
+_WHEELS = """\
+tuple(
+            Wheel(link, rolling={rolling:g}, sideways={mu:g}, axle=True) for link in range({links})
+        )"""
 _STANDS_ON = {
     "feet": """
     # and what they stand on: feet on each link, evenly spread; or one by one,
     # feet=(Foot(0), Wheel(1), ...)""",
     "wheels": """
-    # and what they stand on: a wheel in the middle of each link, with its own friction
-    # in units of the weight""",
+    # and what they stand on: a wheel on an axle in the middle of each link, and what resists its
+    # rolling and its slip sideways, over its load. A robot that rolls easily coasts: its best
+    # gait takes many cycles to come to its speed""",
     "from": """
     # as {source} has it, with the same angles, which count from the tail and counter-clockwise,
     # but for signs: {joints}""",
@@ -362,6 +366,8 @@ def _quantities(solution: Solution) -> list[tuple[str, str]]:
         if problem.froude:
             what = f"({problem.objective.short} of the same gait without inertia)"
             rows.append(("played slowly", f"{solution.played_slowly:.6f} {what}"))
+            cycles, reached = solution.cycles_from_rest
+            rows.append(("from rest", f"{reached:.3g} of its length in cycle {cycles}"))
     if (held := solution.share_held).any():
         shares = ", ".join(f"{100 * share:.0f}" for share in held)
         rows.append(("feet stick", f"during {shares} % of the period (tail to head)"))

@@ -45,7 +45,7 @@ from colloc.numerics.mesh import Mesh
 
 _MOMENTA, _MORE = slice(len(STATES)), slice(-len(STATES), None)
 _VISCOUS, _WETTER, _LEAST_RATIO = 3.0, 10**0.5, 1.02
-"""Delta at which friction is as good as viscous, and the largest and the smallest factor between deltas."""
+"""Delta at which friction is as good as viscous; largest and smallest factor between deltas."""
 _TOLERANCE, _BALANCED = 1e-12, 1e-9
 """Residual at which balances are solved, and where rounding may stop the solver."""
 OMEGA, OUTPUTS = 2, slice(2, None)

@@ -201,6 +201,8 @@ def _parts(root: Element) -> list[_Part]:
         place, turn = frame = frame_of(body, above, of)
         # joints of the first body place it in the world
         joints = elements(body, "joint", usual) if part else []
+        if len(joints) == 2 and joints[0].get("stiffness"):  # a wheel that a spring presses
+            del joints[0]
         part = part or _Part(body.get("name", ""))
         if len(joints) > 1:
             raise ProblemError(f"{of} has {len(joints)} joints: a chain has one between two links.")
@@ -351,7 +353,8 @@ def _chain(parts: list[_Part]) -> Model:
                 angle = math.remainder(math.atan2(rolls @ left, rolls @ ahead), math.pi)
                 more += f", angle={angle:.6g}" if abs(angle) > _SMALL else ""
                 own = f"rolling={along:g}, sideways={across:g}"
-                more += ", sideways={mu:g}" if x in wheels else f", {own}"
+                free = ", rolling={rolling:g}, sideways={mu:g}, axle=True"
+                more += free if x in wheels else f", {own}"
                 directed += [x] if x not in wheels else []
             place = (x.place @ ahead - at[k]) / lengths[k]
             rows.append((round(float(place), 6) + 0.0, kind, more))

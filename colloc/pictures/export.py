@@ -6,8 +6,9 @@ about the vertical.
 
 MJCF: each foot is a small body on a vertical slide with a spring that presses with its weight; pads
 and links stand on Gauss points. A contact `<pair>` has two coefficients, the first along the axis
-of a capsule, so a foot with directed friction is a very short capsule. MuJoCo's friction is that of
-`colloc.Elliptic`, also for other laws (`_elliptic`). Its sliding contacts are lifted the more the
+of a capsule, so a foot with directed friction is a very short capsule. A foot under `colloc.Axle`
+is a wheel on a hinge, whose dry friction resists rolling. MuJoCo's other friction is that of
+`colloc.Elliptic` (`_in_mujoco`). Its sliding contacts are lifted the more the
 slower they respond: hence short steps, constraints of two steps, and an impedance that begins at 0.
 
 URDF has no friction, springs or motors.
@@ -31,6 +32,7 @@ from scipy.interpolate import CubicHermiteSpline
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.limits import range_of
 from colloc.laws.resistance import Elliptic
+from colloc.mechanics.axle import Axle
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.mechanics.floor_contact import whole_links
@@ -72,6 +74,7 @@ _POINTS = 16  # on which a pad or a link stands
 _STEPS, _LONGEST = 8000, 1e-3  # time steps of a period, and the longest one [s]
 _AXIS, _MASS = 1e-4, 1e-6  # half length of a capsule, and mass of a foot, in those of the body
 _STIFF = 5000.0  # gain of the position servos per rad, over the largest torque of the gait
+_SPIN = 1e-3  # moment of inertia of a wheel, in load times radius squared
 _LEAST = 1e-5  # smallest coefficient of friction in MuJoCo
 _RESERVE = 1.5  # effort and speed that a URDF allows a joint, over the largest of the gait
 
@@ -357,16 +360,16 @@ def _write_model(robot: RobotSheet, path: Path) -> dict[str, Any]:
     else:
         laws = dict.fromkeys([foot.friction or law for foot in chain.standing_on] or [law])
         note = ", ".join(
-            f"{x.label} is {_elliptic(x).label}" for x in laws if _elliptic(x) is not x
+            f"{x.label} is {_in_mujoco(x).label}" for x in laws if _in_mujoco(x) is not x
         )
         note = note and f"friction in MuJoCo is elliptic, and alike forwards and backwards: {note}"
         feet = tuple(
-            replace(foot, friction=foot.friction and _elliptic(foot.friction))
+            replace(foot, friction=foot.friction and _in_mujoco(foot.friction))
             for foot in chain.standing_on
         )
         with suppress(*_UNKNOWN):
             facts["moves_body_lengths_per_period"] = inertial_motion(
-                replace(chain, feet=feet) if chain.feet else chain, _elliptic(law), solution.gait,
+                replace(chain, feet=feet) if chain.feet else chain, _in_mujoco(law), solution.gait,
                 solution.delta_per_period, robot.froude, tolerance=1e-3, turn=solution.rotation,
                 breaks=solution.gait.corner_phases, regime=problem.regime,
             ).distance  # fmt: skip
@@ -417,7 +420,9 @@ def mjcf(robot: RobotSheet, *, contacts: bool = True) -> str:
     # points on which it stands, each pressed on the floor with its share of the weight
     standing = chain.standing_on or whole_links(chain.weight_column()[:, 0])
     for foot in standing if floor else ():
-        law: Any = _elliptic(foot.friction or problem.friction)
+        law: Any = _in_mujoco(foot.friction or problem.friction)
+        turns = isinstance(law, Axle)
+        both = (law.largest,) * 2 if turns else (law.mu_f, law.mu_t)
         rule = np.polynomial.legendre.leggauss(_POINTS) if foot.extent else ([0.0], [2.0])
         for node, share in zip(*rule, strict=True):
             along = (foot.place + 0.5 * node * foot.extent) * parts["lengths"][foot.link]
@@ -428,16 +433,18 @@ def mjcf(robot: RobotSheet, *, contacts: bool = True) -> str:
                     "place": (along, foot.offset * robot.length, 0),
                     "angle": foot.angle,
                     "borne": robot.mass * (0.5 * share * float(foot.weight or 0.0)),
-                    "friction": (law.mu_f, law.mu_t, 0, 0, 0),  # a contact has no other resistance
-                    "directed": f"{law.mu_f:.9g}" != f"{law.mu_t:.9g}",
+                    "friction": (*both, 0, 0, 0),  # a contact has no other resistance
+                    "directed": len({f"{x:.9g}" for x in both}) > 1,
+                    "rolling": law.rolling if turns else 0.0,
                 }
             )
     pull = problem.regime.pull(np.array([[getattr(gait, "theta", None) or 0.0]]))
     leaning = (0.0, 0.0) if pull is None else pull[:, 0]  # gravity leans, not the floor
     start = gait.angles(np.zeros(1))[:, 0]
-    posture = [0.0, 0.0, 0.0]  # the tail, joints, and feet on their slides, link by link
+    posture = [0.0, 0.0, 0.0]  # the tail, joints, and feet on slides and hinges, link by link
     for k in range(chain.n_link):
-        posture += [*start[max(k - 1, 0) : k], *(0.0 for foot in feet if foot["link"] == k)]
+        dofs = sum(1 + bool(foot["rolling"]) for foot in feet if foot["link"] == k)
+        posture += [*start[max(k - 1, 0) : k], *[0.0] * dofs]
     return _xml(
         "robot.xml",
         robot,
@@ -449,6 +456,7 @@ def mjcf(robot: RobotSheet, *, contacts: bool = True) -> str:
         foot_mass=_MASS * robot.mass,
         axis=_AXIS * robot.length,
         stiff=_STIFF,
+        spin=_SPIN,
         posture=posture,
         start=start,
     )
@@ -462,9 +470,10 @@ def urdf(robot: RobotSheet) -> str:
 MODELS = {".xml": mjcf, ".urdf": urdf}
 
 
-def _elliptic(law: Law) -> Law:
-    """The law of MuJoCo that is nearest to a dry one."""
-    if isinstance(law, Friction) and law.associated and law.reversible:
+def _in_mujoco(law: Law) -> Law:
+    """The law in MuJoCo that is nearest to a dry one."""
+    dry = isinstance(law, Friction) and law.associated and law.reversible
+    if dry or isinstance(law, Axle):
         return law
     one, none = np.ones((1, 1)), np.zeros((1, 1))
     ahead, back, aside = (

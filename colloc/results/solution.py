@@ -49,6 +49,7 @@ NOT_CONVERGED = "not converged"
 CERTIFICATE_FAILED = "certificate failed"
 INTERRUPTED = "interrupted"
 _INSTANTS = np.arange(2000) / 2000  # to count at
+_MOST_CYCLES, _ALIKE, _ROUGHLY = 40, 0.02, 1e-4  # from rest; error of a cycle
 _TINY_SWING, _TINY_DISTANCE = math.radians(8), 0.02
 
 
@@ -198,6 +199,23 @@ class Solution:
         )
         period = {"period": self.froude**-0.5} if self.froude else {}
         return float(p.objective({**replay.values, **period}))
+
+    @property
+    def cycles_from_rest(self) -> tuple[int, float]:
+        """After how many cycles from rest, at most 40, a body with inertia goes as far in a cycle
+        as once it has settled, within 2 %; and how far it goes in the last of them."""
+        from colloc.verification.differential_motion import GaitWithInertia
+
+        p, state, way, cycles = self.problem, np.zeros(7), 0.0, 0
+        moving = GaitWithInertia(
+            *(p.body, p.law, self.gait, self.delta_per_period),
+            froude=self.froude, breaks=self.gait.corner_phases, regime=p.regime,
+        )  # fmt: skip
+        state[3] = moving.theta
+        while cycles < _MOST_CYCLES and abs(way - self.distance) > _ALIKE * self.distance:
+            before, state = state, moving.run(state, _ROUGHLY).states[:, -1]
+            way, cycles = float(np.hypot(*(state - before)[4:6])), cycles + 1
+        return cycles, way
 
     def slow_enough(self, loss: float = 0.01) -> float:
         """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than

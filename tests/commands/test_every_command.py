@@ -252,7 +252,7 @@ def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):
     assert bodies[0].lengths == pytest.approx([22 / 104, 30 / 104, 30 / 104, 22 / 104])
     assert bodies[1].lengths == pytest.approx(bodies[0].lengths)
     assert bodies[0] == Chain(
-        bodies[0].lengths, feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(4))
+        bodies[0].lengths, feet=tuple(Wheel(link, rolling=0.05, axle=True) for link in range(4))
     )
 
 

@@ -114,7 +114,9 @@ def test_free_hinges_across_are_wheels_and_spheres_under_a_box_feet(tmp_path):
     offsets = sorted(foot.offset * 0.32 for foot in problem.body.feet)
     assert offsets == pytest.approx([-0.02] * 3 + [0.02] * 3)
     assert [foot.place for foot in problem.body.feet[::2]] == pytest.approx([0.5, 5 / 12, 0.5])
-    assert {foot.friction for foot in problem.body.feet} == {Wheel(0, sideways=0.4).friction}
+    assert {foot.friction for foot in problem.body.feet} == {
+        Wheel(0, rolling=0.05, sideways=0.4, axle=True).friction
+    }
     assert problem.body.weights == pytest.approx(np.array([0.14, 0.22, 0.30]) / 0.66)
     ball = '<collision><origin xyz="0.03 0 0"/><geometry><sphere radius="0.01"/></geometry></collision>'
     box = '<visual><origin xyz="0.05 0 0"/><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
@@ -161,7 +163,7 @@ def test_wheels_and_pads_come_back_from_mjcf(tmp_path):
     parts = (
         Wheel(0, 0.4, rolling=0.05, sideways=0.8),
         Pad(1, 0.2, 0.7),
-        Wheel(2, rolling=0.05, sideways=0.8),
+        Wheel(2, rolling=0.05, sideways=0.8, axle=True),
     )
     problem = Problem("there", body=Chain(feet=parts), gait=Harmonic(1, "none"))
     gait = colloc.Fourier(np.zeros(2), 0.6 * np.eye(2)[:, :1], 0.6 * np.eye(2)[:, 1:])

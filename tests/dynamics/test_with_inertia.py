@@ -179,6 +179,14 @@ def paced():
     return colloc.evaluate(colloc.Problem("paced", froude=0.1, delta=1e-2), ROUND)
 
 
+def test_cycles_from_rest_are_those_after_which_the_motion_goes_as_far(paced):
+    at = paced.problem.body, paced.problem.law, ROUND, 1e-2, 0.1
+    off = np.abs(colloc.motion_from_rest(*at, periods=4).periods[:, 0] / paced.distance - 1)
+    cycles, way = paced.cycles_from_rest
+    assert cycles == np.argmax(off < 0.02) + 1
+    assert way == pytest.approx(paced.distance, rel=0.02)
+
+
 def test_a_gait_that_is_given_is_evaluated_at_its_pace(paced):
     stated, found = paced.problem, paced
     played = colloc.inertial_motion(stated.body, stated.law, ROUND, 1e-2, 0.1)

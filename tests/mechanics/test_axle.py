@@ -18,7 +18,6 @@ from colloc import (
     solve,
     solve_balance,
 )
-from colloc.pictures.export import mjcf
 from tests.mechanics.test_floor_contact import wheels_that_do_not_slip
 
 DELTA = 1e-4
@@ -120,5 +119,3 @@ def test_it_is_solved_and_certified_and_another_replay_says_the_same():
     # its mirror image goes as far
     image = evaluate(problem, Fourier.from_table(-found.gait.table))
     assert image.distance == pytest.approx(found.distance)
-    # MuJoCo has no such contact, and the file has its nearest
-    assert 'friction="0.3 1 0 0 0"' in mjcf(found.robot(length=1.0, mass=1.0, period=5.0))

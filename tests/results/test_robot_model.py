@@ -124,7 +124,9 @@ def played(path, gait, period, periods=2):
 TURNED = tuple(
     Wheel(k, 0.4, angle=s * (0.3, 1.5, 0.2)[k], offset=0.03 * s) for k in range(3) for s in (1, -1)
 )
-WHEELS, PADS = tuple(map(Wheel, range(3))), tuple(Pad(link, 0.25, 0.75) for link in range(3))
+WHEELS = tuple(map(Wheel, range(3)))
+AXLES = tuple(Wheel(link, 0.4, rolling=0.05, axle=True) for link in range(3))
+PADS = tuple(Pad(link, 0.25, 0.75) for link in range(3))
 
 
 @pytest.mark.parametrize(
@@ -134,9 +136,10 @@ WHEELS, PADS = tuple(map(Wheel, range(3))), tuple(Pad(link, 0.25, 0.75) for link
         (Chain(feet=1), 1, (0.0, 1.6, 1.1)),
         (Chain(UNEVEN, feet=WHEELS, masses=MASSES), 1, (0.0, 0.8, 0.6)),
         (Chain(feet=TURNED), 1, (0.1, 0.8, 0.6)),
+        (Chain(UNEVEN, feet=AXLES, masses=MASSES), 1, (0.0, 0.8, 0.6)),
         pytest.param(Chain(feet=PADS), 2, (0.0, 1.6, 1.1), marks=pytest.mark.slow),
     ],
-    ids=["lying", "feet", "wheels", "turned wheels", "pads"],
+    ids=["lying", "feet", "wheels", "turned wheels", "axles", "pads"],
 )
 def test_a_file_moves_in_mujoco_as_it_is_written_as_colloc_says(
     body, mu_t, gait, unsolved, tmp_path
@@ -149,6 +152,25 @@ def test_a_file_moves_in_mujoco_as_it_is_written_as_colloc_says(
     moved = np.hypot(*(centre[:, -1] - centre[:, 0])) / 1.04
     assert moved == pytest.approx(stated["moves_body_lengths_per_period"], rel=0.04)
     assert direction_of_travel(centre, tail) == solution.robot(**size).facts["travels"]
+
+
+@pytest.mark.slow
+def test_a_coasting_robot_comes_in_mujoco_to_the_speed_that_colloc_says(unsolved, tmp_path):
+    """README's robot and about its best gait, which takes many cycles to build up its speed."""
+    wheels = tuple(Wheel(link, rolling=0.05, sideways=0.3, axle=True) for link in range(4))
+    body = Chain(tuple(x / 104 for x in (22, 30, 30, 22)), feet=wheels)
+    table = [
+        [0.026, 0.793, 0.0, -0.08, -0.248],
+        [-0.02, 0.562, -0.64, -0.259, 0.041],
+        [-0.04, -0.105, -0.79, 0.002, 0.233],
+    ]
+    gait = colloc.Fourier.from_table(np.array(table))
+    solution = unsolved(Problem("mine", gait, body, gait=Harmonic(2), delta=1e-3))
+    stated = solution.export(tmp_path / "mine.xml", length=0.62, mass=0.9, period=2.5)
+    assert "note" not in stated  # the file has the problem's friction
+    centre, _ = played(tmp_path / "mine.xml", solution.gait, 2.5, periods=16)
+    moved = np.hypot(*(centre[:, -1] - centre[:, 0])) / 0.62
+    assert moved == pytest.approx(stated["moves_body_lengths_per_period"], rel=0.02)
 
 
 def test_a_urdf_is_a_tree_of_links_with_efforts_and_speeds_that_suffice(uneven):
