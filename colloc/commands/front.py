@@ -87,7 +87,7 @@ def _front_table(
     (names, shown), gaps = front.in_units, {gap.after: gap for gap in front.gaps}
     aims, rows = [aim.expression for aim in front.objectives], list[dict[str, Any]]()
     lines = [
-        f"{' against '.join(aim.name for aim in front.objectives)}, {len(members)} gaits",
+        f"{front.title}, {len(members)} gait{'s' * (len(members) > 1)}",
         f"      {''.join(f'{name:>16s}' for name in names)}",
     ]
     every = zip(members.items(), front.values.tolist(), shown.tolist(), strict=True)
@@ -102,8 +102,8 @@ def _front_table(
         lines.append(f"  {k:3d} {''.join(f'{x:16.7g}' for x in numbers)}  {point.status}")
         if k in gaps:
             lines.append(f"       nothing found between: {gaps[k].why}")
-    if len(rows) == 1:
-        lines = ["no gait goes farther by a thousandth: there is nothing to trade"]
+    if front.is_narrow:
+        lines.append("       the ends differ by less than 1 % in both: there is little to trade")
     content = io.StringIO(newline="")
     writer = csv.DictWriter(content, rows[0])
     writer.writeheader()

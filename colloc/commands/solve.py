@@ -581,7 +581,7 @@ def solve(options: argparse.Namespace) -> int:
             from colloc.search.options import OPTIONS
 
             with complaining("no front"):
-                how = {"best": solution, "starts": OPTIONS.reach_starts}
+                how = {"best": solution, "starts": OPTIONS.starts // 2}
                 table = path.with_suffix(".front.csv")
                 _, facts["front"], lines, more = find_front(options, stated, table, **how)
                 records += more

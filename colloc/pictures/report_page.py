@@ -247,7 +247,7 @@ def _front_section(front: ParetoFront) -> dict[str, Any]:
         gaits = Panel(COLUMN, 3.2, lambda axes: draw_gaits(axes, points))
         drawn.append(_picture(gaits, "their gaits"))
     return {
-        "title": f"{front.objectives[0].name} against {front.objectives[1].name}".capitalize(),
+        "title": front.title[:1].upper() + front.title[1:],
         "pictures": drawn,
         "head": ("gait", *names, "joints move by [deg]", "status"),
         "rows": rows,

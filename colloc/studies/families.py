@@ -91,6 +91,16 @@ class ParetoFront:
         return ("speed [cm/s]", "energy [J/m]"), np.transpose([speed, energy])
 
     @property
+    def title(self) -> str:
+        """Such as "speed against energy"."""
+        return " against ".join(label.partition(" [")[0] for label in self.in_units[0])
+
+    @property
+    def is_narrow(self) -> bool:
+        """True if nobody can tell its ends apart by their objectives."""
+        return not _told(self.values).any()
+
+    @property
     def certified(self) -> bool:
         """True if the gaits that were found in its gaps are certified, too."""
         return all(gap.certified for gap in self.gaps)
@@ -291,13 +301,18 @@ def _thin(points: Iterable[_Point], intervals: int) -> list[_Point]:
     return sorted(front, key=lambda each: -each.values[0])
 
 
+def _told(values: np.ndarray) -> np.ndarray:
+    """Objectives by which the ends of a front can be told apart, ``(2,)``."""
+    told: np.ndarray = np.ptp(values, axis=0) > OPTIONS.close * np.abs(values).max(axis=0)
+    return told
+
+
 def _apart(front: list[_Point], intervals: int) -> dict[tuple[_Point, _Point], np.ndarray]:
     """Neighbours and their distance in each objective over the even spacing; 0 in an objective in
     which nobody can tell the ends apart."""
     values = np.array([each.values for each in front])
-    spread = np.ptp(values, axis=0)
-    told = spread > OPTIONS.close * np.abs(values).max(axis=0)
-    apart = np.abs(np.diff(values, axis=0)) * np.where(told, 1.0, 0.0) / np.where(told, spread, 1.0)
+    spread = np.where(_told(values), np.ptp(values, axis=0), np.inf)
+    apart = np.abs(np.diff(values, axis=0)) / spread
     return dict(zip(pairwise(front), intervals * apart, strict=True))
 
 

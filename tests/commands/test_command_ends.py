@@ -365,7 +365,10 @@ from colloc import *
 FLOOR = Friction(mu_t=4, mu_f=1, mu_b=1)
 PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=FLOOR, delta=1e-2, mesh_tolerance=1e-3)
 """
-SEVERAL = {"steer": ["--turn", "10"], "pareto": ["--points", "2"]}
+SEVERAL = {
+    "steer": ["--turn", "10"],
+    "pareto": ["--points", "2", "--objectives", "speed", "efficiency"],
+}
 
 
 @pytest.mark.parametrize("name", SEVERAL)

@@ -122,7 +122,7 @@ def test_a_gait_that_turns_is_as_far_whether_its_certificate_knows_the_objective
 def from_the_answer():
     """One foot on each of three links, as `colloc solve --front` does it."""
     best = solve(FEET, 8)
-    return best, pareto_front(FEET, best=best, starts=8)
+    return best, pareto_front(FEET, best=best, starts=16)
 
 
 FEET = Problem("feet", body=Chain(feet=1), gait=Harmonic(1, "bilateral"), delta=1e-3)
