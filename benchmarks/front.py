@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 
 import colloc
-from colloc.search.options import OPTIONS
 from scripts.program import command_line
 
 
@@ -19,7 +18,7 @@ def main() -> None:
         begin = time.process_time()
         best = colloc.solve(file)
         middle = time.process_time()
-        front = colloc.pareto_front(best.problem, best=best, starts=OPTIONS.starts // 2)
+        front = colloc.pareto_front(best.problem, best=best)
         solve, more = middle - begin, time.process_time() - middle
         print(f"{file}: solve {solve:.1f} s, front {more / solve:.1f} times that; {front}")
 

@@ -293,14 +293,11 @@ def sweep_summary(study: Study, table: StudyTable, path: Path) -> tuple[dict[str
     return facts, lines
 
 
-def _begin(options: argparse.Namespace, ending: str) -> tuple[ProblemFile, Path, int]:
-    """The problem, the table to write and the number of starts."""
+def _begin(options: argparse.Namespace, ending: str) -> tuple[ProblemFile, Path, int | None]:
+    """The problem, the table to write and the number of starts, if one is stated."""
     stated, problem = cli.read_problem(options)
     table = cli.output_path(options, Path("results") / f"{problem.name}.{ending}")
-    from colloc.search.options import OPTIONS
-
-    starts = options.starts or stated.starts or OPTIONS.starts
-    return replace(stated, problem=problem), table, starts
+    return replace(stated, problem=problem), table, options.starts or stated.starts
 
 
 def _end(options: argparse.Namespace, found: Found) -> int:
@@ -327,7 +324,7 @@ colloc solve --front begins at the answer.
         default=(None, None),
     ),
     cli.option(int, "--points", "N", "about so many, without duplicates (default: 5)", 5, least=2),
-    cli.option(int, "--starts", "N", "starting points for both ends (default: 32)", least=1),
+    cli.option(int, "--starts", "N", "starting points for both ends (default: as solve)", least=1),
     cli.output("folder, or .csv file (default: results/NAME.front.csv)"),
     cli.NO_FIGURE,
 )
@@ -373,7 +370,8 @@ def steer(options: argparse.Namespace) -> int:
 
         say("the straight gait")
         turns, spot = ([*map(math.radians, each)] for each in (options.turn, options.spot))
-        return find_gaits(stated.problem, turns, spot=spot, starts=starts, progress=report)
+        how = {} if starts is None else {"starts": starts}
+        return find_gaits(stated.problem, turns, spot=spot, progress=report, **how)
 
     def describe(
         family: Steering, members: dict[Path, Solution]

@@ -102,8 +102,7 @@ def _front_table(
         lines.append(f"  {k:3d} {''.join(f'{x:16.7g}' for x in numbers)}  {point.status}")
         if k in gaps:
             lines.append(f"       nothing found between: {gaps[k].why}")
-    if front.is_narrow:
-        lines.append("       the ends differ by less than 1 % in both: there is little to trade")
+    lines += [f"  {front.narrow}"] * bool(front.narrow)
     content = io.StringIO(newline="")
     writer = csv.DictWriter(content, rows[0])
     writer.writeheader()

@@ -252,7 +252,7 @@ def _front_section(front: ParetoFront) -> dict[str, Any]:
         "head": ("gait", *names, "joints move by [deg]", "status"),
         "rows": rows,
         "films": _films({f"{k:02d}": point for k, point in enumerate(points)}),
-        "note": "",
+        "note": front.narrow,
     }
 
 

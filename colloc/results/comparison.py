@@ -26,7 +26,11 @@ def _rows(one: dict[str, str], two: dict[str, str]) -> Rows:
 
 
 def _fields(solution: Solution) -> dict[str, str]:
-    return {name: json.dumps(value) for name, value in solution.problem.to_dict().items()}
+    texts: dict[str, str] = {}
+    for name, value in solution.problem.to_dict().items():
+        parts = value if isinstance(value, dict) else {"": value}
+        texts |= {f"{name} {part}".strip(): json.dumps(x) for part, x in parts.items()}
+    return texts
 
 
 def _numbers(solution: Solution) -> dict[str, str]:

@@ -96,9 +96,10 @@ class ParetoFront:
         return " against ".join(label.partition(" [")[0] for label in self.in_units[0])
 
     @property
-    def is_narrow(self) -> bool:
-        """True if nobody can tell its ends apart by their objectives."""
-        return not _told(self.values).any()
+    def narrow(self) -> str:
+        """A sentence if nobody can tell its ends apart by their objectives, else ""."""
+        little = "The ends differ by less than 1 % in both: there is little to trade."
+        return "" if _told(self.values).any() else little
 
     @property
     def certified(self) -> bool:
@@ -134,7 +135,7 @@ def pareto_front(
     points: int = 5,
     *,
     best: Solution | None = None,
-    starts: int = OPTIONS.starts,
+    starts: int | None = None,
     progress: Callable[[int, Solution], object] | None = None,
 ) -> ParetoFront:
     """Find the Pareto front of two objectives of a problem.
@@ -151,8 +152,8 @@ def pareto_front(
         either objective. Dominated points and duplicates are left out.
     best : Solution, optional
         The certified best gait by the second objective, if it is known; its problem counts then.
-    starts : int
-        Starting points for both ends.
+    starts : int, optional
+        Starting points for both ends; by default as many as a solve takes.
     progress : callable, optional
         Called with the number of gaits certified so far and the last one.
 
@@ -178,7 +179,8 @@ def pareto_front(
     aims = objective_from(first or way), objective_from(second or problem.objective)
     if aims[0].expression == aims[1].expression:
         raise ProblemError(f"a front needs two objectives, not {aims[0].name} twice.")
-    check_count(starts=starts)
+    if starts is not None:
+        check_count(starts=starts)
     if not 2 <= points <= _MOST_POINTS:
         raise ProblemError(f"a front has 2 to {_MOST_POINTS} points, not {points}.")
     reachable = with_reachable_distance(problem)

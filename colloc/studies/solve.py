@@ -172,7 +172,7 @@ def checkpoints_in(folder: Path) -> Iterator[None]:
         file.unlink(missing_ok=True)
 
 
-def solve_member(problem: Problem, starts: int) -> Solution:
+def solve_member(problem: Problem, starts: int | None) -> Solution:
     """Solve one problem of a family. KeyboardInterrupt if that is interrupted."""
     folder = _FOLDER.get()
     keep = None if folder is None else run_file(folder / f"member-{problem.hash[:16]}.h5")

@@ -121,8 +121,8 @@ def test_a_gait_that_turns_is_as_far_whether_its_certificate_knows_the_objective
 @pytest.fixture(scope="module")
 def from_the_answer():
     """One foot on each of three links, as `colloc solve --front` does it."""
-    best = solve(FEET, 8)
-    return best, pareto_front(FEET, best=best, starts=16)
+    best = solve(FEET)
+    return best, pareto_front(FEET, best=best)
 
 
 FEET = Problem("feet", body=Chain(feet=1), gait=Harmonic(1, "bilateral"), delta=1e-3)
@@ -140,7 +140,7 @@ def test_every_gait_is_as_far_and_as_efficient_by_replay(from_the_answer):
 @pytest.mark.slow
 def test_from_the_answer_to_the_farthest_none_is_dominated_and_all_differ(from_the_answer):
     best, front = from_the_answer
-    farthest = solve(FEET.with_(objective="distance"), 32)
+    farthest = solve(FEET.with_(objective="distance"))
     assert front.points[-1] is best
     assert front.values[0, 0] == pytest.approx(farthest.distance, rel=1e-4)
     assert 4 <= len(front.points) <= 8
