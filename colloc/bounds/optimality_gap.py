@@ -82,4 +82,4 @@ def gap_line(
         return f"  no upper bound on {problem.objective.name!r} is known"
     limit = 1.0 / problem.law.smallest
     tighter = "" if asked or refusal(problem) else "; --bound computes a tighter one"
-    return f"  upper bound {limit:.4g} = 1/min(mu), gap {limit - efficiency:.4f}{tighter}"
+    return f"  upper bound {limit:.4g} (= 1/min mu), gap {limit - efficiency:.4f}{tighter}"

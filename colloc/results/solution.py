@@ -262,7 +262,7 @@ class Solution:
         # others are as a coarse mesh sees them, and one that shrank may be better
         this = min(self.others, key=lambda other: abs(other.value - self.answer.value))
         others = "; ".join([str(other) for other in self.others if other is not this][:4])
-        first = f"local optimum, best of {self.starts} starts, {this.starts} of which met it"
+        first = f"local optimum, best of {self.starts} starts; {this.starts} converged to it"
         return [first, f"also met, on a coarse mesh: {others}"] if others else [first]
 
     @property

@@ -316,7 +316,7 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
             failed += f"{1 + excess:.4g} times as much {window}"
         advice = next(text for names, text in _ADVICE.items() if group.startswith(names))
     elif result.status == "still moving":
-        failed = "the gait kept moving from trust region to trust region"
+        failed = "the optimiser did not settle, from one trust region to the next"
         advice = "start from a better guess"
     else:
         what = program.control.aims.objective.name

@@ -282,7 +282,7 @@ def refine(iterate: Iterate) -> Iterate:
             if more_panels is None and plan is None and iterate.kkt == FINE:
                 return iterate
             if count == OPTIONS.meshes:
-                text = f"refinement ended after {count} meshes: the gait still moves with the mesh."
+                text = f"mesh refinement stopped after {count} meshes without converging."
                 return replace(iterate, message=text)
             if more_panels is not None:
                 (space, v), kkt = more_panels, MEDIUM

@@ -206,10 +206,9 @@ def certify_answer(problem: Problem, answer: Answer) -> Solution:
     elif is_free and on_speed_floor(problem, answer.gait):
         better = "more efficient" if problem.objective == EFFICIENCY else "better"
         text = (
-            f"the optimum lies on the bound smallest_shape_speed = "
-            f"{problem.smallest_shape_speed:g}: the gait shrinks as far as it may, smaller ones "
-            f"are {better} still. For a gait that a robot can make raise the bound; to see how far "
-            "smaller ones go, lower it (and delta with it)."
+            f"this gait is as small as smallest_shape_speed = {problem.smallest_shape_speed:g} "
+            f"allows; smaller ones are {better} still. For a gait that a robot can make raise the "
+            "bound; for smaller ones lower it (and delta with it)."
         )
     elif is_free and on_speed_floor(answer.problem, answer.gait):
         text = (
@@ -265,8 +264,8 @@ def choose(problem: Problem, solutions: Sequence[Solution]) -> Solution:
     if finite and smaller and not problem.shrinking:
         solution.shrunk = max(smaller, key=value)
         text = (
-            f"Smaller gaits do better still: {solution.shrunk.certificate.value:.6f} where one "
-            f"shrank until nobody sees it move, kept beside this one."
+            f"A tiny gait does better still, {solution.shrunk.certificate.value:.6f}, but nobody "
+            f"would see it move: it is saved beside this one."
         )
         solution.message = f"{solution.message} {text}".strip()
     return solution

@@ -143,7 +143,7 @@ def test_a_broken_cache_of_bounds_costs_a_line_and_no_summary(solve, tmp_path):
     code, said, complaint = solve("--no-figure")
     assert code in OK
     assert "efficiency d/W" in said
-    assert "upper bound 1 = 1/min(mu)" in said
+    assert "upper bound 1 (= 1/min mu)" in said
     assert complaint.count("No bound is taken from it") == 1
 
 

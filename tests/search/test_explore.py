@@ -90,7 +90,7 @@ def test_four_links_whose_twitch_is_best_get_a_gait_that_one_sees_and_that_is_as
     assert swing(solution.gait) > 9 > swing(solution.shrunk.gait)
     assert solution.shrunk.value > solution.value
     met = min(solution.others, key=lambda other: abs(other.value - solution.value))
-    assert f"{met.starts} of which met it" in solution.standing[0]
+    assert f"{met.starts} converged to it" in solution.standing[0]
 
 
 @pytest.mark.slow

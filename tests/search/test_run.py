@@ -164,7 +164,7 @@ def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_b
     else:
         assert chosen.answer is found.answer
         assert chosen.shrunk.answer is small.answer
-        assert "Smaller gaits do better still" in chosen.message
+        assert "A tiny gait does better still" in chosen.message
     assert choose(found.problem, [small]).answer is small.answer
 
 
