@@ -363,7 +363,7 @@ def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_pat
 ONE_AFTER_ANOTHER = """
 from colloc import *
 FLOOR = Friction(mu_t=4, mu_f=1, mu_b=1)
-PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=FLOOR, delta=1e-2, mesh_tolerance=1e-3)
+PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=FLOOR, delta=3e-3, mesh_tolerance=1e-4)
 """
 SEVERAL = {
     "steer": ["--turn", "10"],
