@@ -329,7 +329,8 @@ def export(options: argparse.Namespace) -> int:
         ]
         if (moves := facts.get("moves_body_lengths_per_period")) is not None:
             lines.append(
-                f"  colloc has it move {moves:.4g} body lengths a period on its floor, with inertia"
+                f"  colloc has it move {moves:.4g} body lengths a period on its floor, with "
+                "inertia, once it has settled"
             )
         lines += [f"  note: {facts['note']}"] if "note" in facts else []
     else:

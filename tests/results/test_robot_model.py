@@ -136,7 +136,9 @@ PADS = tuple(Pad(link, 0.25, 0.75) for link in range(3))
         (Chain(feet=1), 1, (0.0, 1.6, 1.1)),
         (Chain(UNEVEN, feet=WHEELS, masses=MASSES), 1, (0.0, 0.8, 0.6)),
         (Chain(feet=TURNED), 1, (0.1, 0.8, 0.6)),
-        (Chain(UNEVEN, feet=AXLES, masses=MASSES), 1, (0.0, 0.8, 0.6)),
+        pytest.param(
+            Chain(UNEVEN, feet=AXLES, masses=MASSES), 1, (0.0, 0.8, 0.6), marks=pytest.mark.slow
+        ),
         pytest.param(Chain(feet=PADS), 2, (0.0, 1.6, 1.1), marks=pytest.mark.slow),
     ],
     ids=["lying", "feet", "wheels", "turned wheels", "axles", "pads"],
