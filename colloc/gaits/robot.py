@@ -101,6 +101,10 @@ class Robot:
         """Component of gravity normal to the ground [m/s^2]."""
         return self.gravity * math.cos(math.atan(grade))
 
+    def torque_unit(self, grade: float) -> float:
+        """m g L [N m]."""
+        return self.mass * self.pressing(grade) * self.length
+
     def speed_limits(self, grade: float, n_joint: int) -> tuple[PathLimit, ...]:
         """Limits of the joints' speeds where the period is sought with the gait."""
         if not isinstance(self.period, tuple) or self.max_speed is None:
@@ -112,7 +116,7 @@ class Robot:
         """The objective and the fields `DERIVED` of a problem on such a grade; without inertia if
         it does not count beside the smallest coefficient of friction."""
         pressing = self.pressing(grade)
-        unit = self.mass * pressing * self.length  # of work and torque
+        unit = self.torque_unit(grade)
         times = self.period if isinstance(self.period, tuple) else (self.period,)
         low, high = (self.length / (pressing * t**2) for t in (times[-1], times[0]))
         froude: Any = Free(low, high) if len(times) == 2 else low

@@ -76,19 +76,17 @@ class Servo:
 
     def pulses(self, angles: np.ndarray) -> tuple[np.ndarray, list[int]]:
         """Whole pulses of angles [rad], and how many of each joint are clamped."""
-        joints, columns = len(angles), {}
+        columns: list[np.ndarray] = []
         for name, many in (("neutral", 1), ("scale", 1), ("sign", 1), ("clamp", 2)):
-            values = np.array(getattr(self, name) or (-np.inf, np.inf)).reshape(-1, many, 1)
-            if len(values) not in (1, joints):
+            values = np.reshape(getattr(self, name) or (-np.inf, np.inf), (-1, many, 1))
+            if len(values) not in (1, len(angles)):
                 raise ProblemError(
-                    f"{name} of servos is given for {len(values)} joints of {joints}: give it once "
-                    "for all, or for each."
+                    f"{name} of servos is given for {len(values)} joints of {len(angles)}: give it "
+                    "once for all, or for each."
                 )
-            columns[name] = values
-        low, high = columns["clamp"].transpose(1, 0, 2)
-        wanted = columns["neutral"][:, 0] + columns["sign"][:, 0] * columns["scale"][:, 0] * (
-            np.degrees(angles)
-        )
+            columns += [*values.transpose(1, 0, 2)]
+        neutral, scale, sign, low, high = columns
+        wanted = neutral + sign * scale * np.degrees(angles)
         kept = np.clip(wanted, low, high)
         return np.rint(kept).astype(int), np.sum(kept != wanted, axis=1).tolist()
 

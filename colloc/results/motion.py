@@ -4,6 +4,7 @@ of it: outline, feet, speeds and friction."""
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,6 +13,7 @@ import numpy as np
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import FOOT
+from colloc.mechanics.inertia import tail_velocity
 from colloc.mechanics.law import Law
 from colloc.system.environment import optional
 
@@ -54,6 +56,16 @@ class SampledMotion:
         return (
             f"<SampledMotion at {self.t.size} instants, t = {self.t.min():g} to {self.t.max():g}>"
         )
+
+
+def motion_with_inertia(
+    chain: Chain, gait: Callable[..., Any], t: np.ndarray, states: np.ndarray
+) -> SampledMotion:
+    """Sample a motion from momenta, theta and the place of the centre of mass at phases t."""
+    (angles, rates), theta, centre = gait(t % 1.0), states[3], states[4:6]
+    z = tail_velocity(chain, angles, rates, states[:3])
+    tail = centre - rotate(np.array(chain.centre(angles)), theta)
+    return SampledMotion(t, angles, rates, z, theta, centre, tail)
 
 
 def rotate(vectors: np.ndarray, theta: np.ndarray | float) -> np.ndarray:

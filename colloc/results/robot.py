@@ -20,9 +20,16 @@ from colloc.gaits.robot import check_size
 from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.fixed_point import solve_balance
-from colloc.mechanics.inertia import GRAVITY, checked_mass, momenta, tail_velocity
+from colloc.mechanics.inertia import GRAVITY, checked_mass, momenta
 from colloc.mechanics.law import rate_independent
-from colloc.results.motion import Column, SampledMotion, arc, motion_dataset, rotate
+from colloc.results.motion import (
+    Column,
+    SampledMotion,
+    arc,
+    motion_dataset,
+    motion_with_inertia,
+    rotate,
+)
 from colloc.results.solution import Solution, direction_of_travel
 from colloc.system.environment import higher
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -110,11 +117,9 @@ class _MotionWithInertia:
 
     def sample(self, t: np.ndarray) -> SampledMotion:
         """Motion at ascending phases in [0, 1], in the axes of `Solution.sample`."""
-        states, (angles, rates) = self._course.at(t), self._gait(t)
-        theta, centre = states[3] - self._heading, rotate(states[4:6], -self._heading)
-        z = tail_velocity(self._chain, angles, rates, states[:3])
-        tail = centre - rotate(np.array(self._chain.centre(angles)), theta)
-        return SampledMotion(t, angles, rates, z, theta, centre, tail)
+        states = self._course.at(t)[:6]
+        states[3:] = [states[3] - self._heading, *rotate(states[4:], -self._heading)]
+        return motion_with_inertia(self._chain, self._gait, t, states)
 
 
 def pressing(solution: Solution, gravity: float) -> float:
@@ -127,7 +132,7 @@ def stated_robot(solution: Solution, **given: Any) -> dict[str, Any]:
     if there are none."""
     stated, robot = {}, solution.problem.robot
     if robot is not None:
-        names = ("length", "mass", "period", "gravity", "max_speed", "max_torque")
+        names = ("length", "mass", "gravity", "max_speed", "max_torque")
         stated = {name: getattr(robot, name) for name in names} | {"period": period_of(solution)}
     stated |= {name: value for name, value in given.items() if value is not None}
     missing = [name for name in ("length", "mass", "period") if name not in stated]
@@ -140,7 +145,8 @@ def period_of(solution: Solution) -> float:
     """Time that a cycle of the problem's robot takes [s]."""
     robot: Any = solution.problem.robot
     if isinstance(robot.period, tuple):
-        return math.sqrt(robot.length / (pressing(solution, robot.gravity) * solution.froude))
+        pace = robot.pressing(solution.problem.grade) * solution.froude
+        return math.sqrt(robot.length / pace)
     return float(robot.period)
 
 
@@ -166,11 +172,9 @@ def drawn_units(solution: Solution) -> Units:
     """Centimetres, seconds, degrees and watts of a robot; else those without dimensions."""
     if (robot := solution.problem.robot) is None:
         return Units()
-    period, newtons = period_of(solution), robot.mass * pressing(solution, robot.gravity)
-    return Units(
-        *(100 * robot.length, "cm", period, "time  [s]", math.degrees(1.0), "deg", "cm/s"),
-        *(newtons * robot.length / period, "W"),
-    )
+    period, work = period_of(solution), robot.torque_unit(solution.problem.grade)
+    lengths, times = (100 * robot.length, "cm"), (period, "time  [s]")
+    return Units(*lengths, *times, math.degrees(1.0), "deg", "cm/s", work / period, "W")
 
 
 def in_si(solution: Solution) -> dict[str, float]:
@@ -180,7 +184,7 @@ def in_si(solution: Solution) -> dict[str, float]:
     if robot is None or not period.replayed:
         return {}
     time, way = period_of(solution), period.distance * robot.length
-    unit = robot.mass * pressing(solution, robot.gravity) * robot.length
+    unit = robot.torque_unit(solution.problem.grade)
     facts = {
         "period_s": time,
         "distance_per_cycle_m": way,
@@ -225,11 +229,11 @@ class RobotSheet:
                 f"{self.length:g} m has to take {needed:.4g} s a period, not {self.period:g}: "
                 f"solve again with froude={self.froude:.4g}."
             )
-        for name, what in (("max_speed", "speed"), ("max_torque", "torque")):
+        paced = problem.froude or not rate_independent(problem.law)
+        for name in ("max_speed", "max_torque"):
             if (limit := getattr(self, name)) is not None:
-                each = one_each(limit, problem.n_motor, f"joint {what} limit")
+                each = one_each(limit, problem.n_motor, f"joint {name[4:]} limit")
                 object.__setattr__(self, name, each)
-                paced = problem.froude or not rate_independent(problem.law)
                 if paced and problem.robot is None:
                     raise ProblemError(
                         f"{name} asks for another pace, and torques depend on it, as "
@@ -301,12 +305,9 @@ class RobotSheet:
         known, or of limits that are not stated, are missing."""
         solution, problem, moving = self.solution, self.solution.problem, self._with_inertia
         motion, values = moving or solution.measured, self.columns
-        work = self.torque_unit * motion.work
         # the last sample repeats the first
-        torques, speeds, powers = (
-            values[f"joint_{x}"].values[:, :-1] for x in ("torques", "speeds", "powers")
-        )
-        peak = np.abs(torques).max(axis=1)
+        rows = {x: values[f"joint_{x}s"].values[:, :-1] for x in ("torque", "speed", "power")}
+        work, powers = self.torque_unit * motion.work, rows["power"]
         facts = {
             "name": problem.name,
             "status": solution.status,
@@ -318,18 +319,16 @@ class RobotSheet:
             "body_lengths_per_period": motion.distance,
             "travels": direction_of_travel(values["centre"].values, values["tail"].values),
             "work_per_period_J": work,
-            "motor_work_per_period_J": self.period
-            * float(np.maximum(powers, 0.0).mean(axis=1).sum()),
+            "motor_work_per_period_J": self.period * float(powers.clip(0).mean(axis=1).sum()),
             "mean_power_W": work / self.period,
             "peak_power_W": float(powers.sum(axis=0).max()),
             "cost_of_transport": motion.work / motion.distance * self.pressing / self.gravity,
             "froude_number": self.froude,
-            "peak_torque_N_m": peak.tolist(),
-            "rms_torque_N_m": np.sqrt((torques**2).mean(axis=1)).tolist(),
-            "peak_speed_rad_per_s": np.abs(speeds).max(axis=1).tolist(),
-            "rms_speed_rad_per_s": np.sqrt((speeds**2).mean(axis=1)).tolist(),
-            "peak_joint_power_W": powers.max(axis=1).tolist(),
         }
+        for name, unit in (("torque", "N_m"), ("speed", "rad_per_s")):
+            facts[f"peak_{name}_{unit}"] = np.abs(rows[name]).max(axis=1).tolist()
+            facts[f"rms_{name}_{unit}"] = np.sqrt((rows[name] ** 2).mean(axis=1)).tolist()
+        facts["peak_joint_power_W"] = powers.max(axis=1).tolist()
         if problem.froude:
             with suppress(NotConvergedError):
                 facts["played_slowly"] = solution.played_slowly
@@ -353,7 +352,7 @@ class RobotSheet:
                 facts["shortest_period_paced_by_speed_s"] = shortest_period(gait, limits)
         if self.max_torque is not None:
             facts["max_torque_N_m"] = np.asarray(self.max_torque).tolist()
-            facts["torque_used"] = (peak / self.max_torque).tolist()
+            facts["torque_used"] = (np.array(facts["peak_torque_N_m"]) / self.max_torque).tolist()
             if moving is not None:
                 slowly = joint_torques(solution, np.arange(_INSTANTS) / _INSTANTS)
                 used = self.torque_unit * np.abs(slowly).max(axis=1) / self.max_torque

@@ -17,7 +17,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.inertia import checked_mass, tail_velocity
+from colloc.mechanics.inertia import checked_mass
 from colloc.results.answer import EVALUATED, PRESCRIBED, Alternative, Answer, Step
 from colloc.results.checks import UNCERTIFIED, Certificate
 from colloc.results.motion import (
@@ -31,8 +31,8 @@ from colloc.results.motion import (
     motion_columns,
     motion_dataset,
     motion_frame,
+    motion_with_inertia,
     part_speeds,
-    rotate,
 )
 from colloc.system.arguments import checked_arguments
 from colloc.system.environment import higher, versions
@@ -305,10 +305,7 @@ class Solution:
             breaks=self.gait.corner_phases,
         )
         states = np.array([np.interp(t, ran.phases, row) for row in ran.states])
-        (angles, rates), theta, centre = self.gait(t % 1.0), states[3], states[4:6]
-        z = tail_velocity(checked_mass(chain), angles, rates, states[:3])
-        tail = centre - rotate(np.array(chain.centre(angles)), theta)
-        return SampledMotion(t, angles, rates, z, theta, centre, tail)
+        return motion_with_inertia(checked_mass(chain), self.gait, t, states)
 
     def holding(self, motion: SampledMotion) -> np.ndarray:
         """Sticking feet, slower than 3 delta, ``(n_foot, n_time)``; no rows without feet."""

@@ -190,7 +190,7 @@ def identify(
             "right?"
         )
     points = [name for name, k in _POINTS.items() if fit.seen[0, k].any() and name != "center"]
-    unit = f"of {length:g} m" if length else "lengths"
+    unit = f"lengths of {length:g} m" if length else "lengths"
     message = f"{fitted.describe()}; path of {', '.join(points) or 'headings'} in body {unit}"
     both = zip(values.tolist(), errors.tolist(), strict=True)
     coefficients = dict(zip(fit.names, both, strict=True))
