@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -58,6 +59,9 @@ class Candidate:
     next: Candidate | None = None
     dry_objective: float = np.inf  # at a delta that is small for all
     is_loop: bool = False
+
+
+_DRY = attrgetter("dry_objective")
 
 
 class Exploration(NamedTuple):
@@ -225,6 +229,13 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
     new_gaits, drawn, n_new = starting_gaits(problem), list[AnyGait | None](), 0
     tried, improved, best, begin = 0, -OPTIONS.patience, 0.0, time.monotonic()
 
+    def measure(candidates: list[Candidate]) -> None:
+        # on wheels that hardly resist the best at the last of these deltas may not be the best dry
+        for candidate in (c for c in candidates if c.dry_objective == np.inf):
+            dry_program = ReducedProgram(candidate.iterate.space, dry)
+            objective = dry_program.objective(candidate.iterate.v)
+            candidate.dry_objective = float(np.nan_to_num(objective, nan=np.inf))
+
     def is_turn_of_new(start: int) -> bool:
         return start // (OPTIONS.starts // 2) % 2 == 0
 
@@ -232,7 +243,7 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
         """The gait of a start, if there is one, and whether it is new: the one of that number. It
         depends on what came before alone, so more starts go wherever fewer do."""
         if not is_turn_of_new(start) and last:
-            best_gait = min((c.iterate for c in last), key=lambda each: each.objective).gait
+            best_gait = min(last, key=_DRY).iterate.gait
             size, rng = OPTIONS.hop * 2.0 ** (start % 3 - 1), np.random.default_rng([1, start])
             return problem.gait.start_class.perturb(best_gait, size, 1, rng), False
         while len(drawn) <= number:
@@ -242,7 +253,7 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
         return drawn[number], True
 
     def is_finished() -> bool:
-        n_met = min(last, key=lambda c: c.iterate.objective).n_new if last else 0
+        n_met = min(last, key=_DRY).n_new if last else 0
         sure = n_met >= max(OPTIONS.patience / 2, n_new / OPTIONS.patience)
         enough = tried >= count or (sure and not starts and 4 * tried >= count)
         if enough and tried > improved + OPTIONS.patience:
@@ -263,7 +274,8 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
         with suppress(CollocError):
             ahead.wait_for(sketch, coarse, gait, is_new, deltas)
             sketch(coarse, gait, is_new, deltas, levels)
-        before, best = best, min((c.iterate.objective for c in last), default=0.0)
+        measure(last)
+        before, best = best, min(map(_DRY, last), default=0.0)
         if tried > 0 and best < before - SAME_VALUE * abs(before):
             improved = tried
         tried += 1
@@ -271,12 +283,10 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
         shown = [*last, *loops] if problem.shrinking else last
         run.report("explore", tried, max(tried, count), _best([c.iterate for c in shown]))
 
-    for candidate in (ends := [*last, *loops]):
-        dry_program = ReducedProgram(candidate.iterate.space, dry)
-        objective = dry_program.objective(candidate.iterate.v)
-        candidate.dry_objective = float(np.nan_to_num(objective, nan=np.inf))
-        candidate.is_loop = candidate in loops
-    return sorted(ends, key=lambda c: c.dry_objective), tried
+    measure(loops)
+    for candidate in loops:
+        candidate.is_loop = True
+    return sorted([*last, *loops], key=_DRY), tried
 
 
 def _best(iterates: Sequence[Iterate]) -> Iterate | None:

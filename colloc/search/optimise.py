@@ -30,6 +30,7 @@ from colloc.reduced.second_order import curvature
 from colloc.search.checkpoint import active_run, checkpoint
 from colloc.search.iterate import STATIONARY, Iterate, evaluate_at, space_near, space_of
 from colloc.search.options import (
+    COARSE,
     FINE,
     MEDIUM,
     OPTIONS,
@@ -49,7 +50,9 @@ def solve_subproblems(
     number of iterations, and the Hessian if it is known."""
     iterations, violation, ends = 0, np.inf, [v]
     program.place_rows(v)
-    for _ in range(max_rounds(kkt)):
+    for done in range(max(4, max_rounds(kkt))):
+        if done >= max_rounds(kkt) and violation <= COARSE:
+            break  # more rounds are for gaits beyond their limits, else given up
         before, violation_before, is_fresh = v, violation, hessian is None
         if len(ends) > 1:
             # with the instants fixed, rounds overshoot where they move far with the gait
