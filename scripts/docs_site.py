@@ -43,7 +43,7 @@ ORDER = {
         howto/studies howto/cluster howto/own_body howto/columns howto/own_gait_class howto/paper
         troubleshooting""",
     "Reference": "reference known published limits commands api modules changelog cite",
-    "Explanation": "theory search gait_classes bound bodies smooth_bodies",
+    "Explanation": "theory collocation search gait_classes bound bodies smooth_bodies",
 }
 PICTURES = (".png", ".gif")
 KEPT = (*PICTURES, ".md")
