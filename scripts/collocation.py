@@ -23,37 +23,41 @@ import three_link_in_one_page as page  # noqa: E402
 from three_link_lifted import lifted  # noqa: E402
 
 DELTAS = {0.1: ORANGE, 0.03: GREEN, 0.01: BLUE, 0.001: VERMILION}
-GAIT = 0.0, 2.86, 1.30
 SHOWN = 3
 """Intervals of the Jacobian that are drawn."""
 
 
 def balanced(delta: float) -> tuple[ca.DM, ca.DM, ca.DM]:
-    """Angles, rates and tail velocities of the gait at all points."""
-    (q, r), z = page.gait(*GAIT), ca.DM.zeros(3, page.n)
+    """Angles, rates and tail velocity where two links of the best gait come to a stop, and
+    around."""
+    t = 2 * np.pi * np.linspace(0.06, 0.08, 401)
+    a, b, c, d = 2.86 * np.cos(t), 1.30 * np.sin(t), -2.86 * np.sin(t), 1.30 * np.cos(t)
+    q, r, z = ca.DM([a + b, b - a]), ca.DM([c + d, d - c]), ca.DM.zeros(3, len(t))
     for _ in range(3000):
-        z = page.step.map(page.n)(q, r, z, delta)
+        z = page.step.map(len(t))(q, r, z, delta)
     return q, r, z
 
 
 def rows_at_one_instant(literal: Axes, lifted: Axes) -> None:
     """Force balance and a lifted row against a velocity of the tail, where a link rests."""
-    _, k = page.sliding.map(page.n)(*balanced(2e-4), 2e-4)
-    component, point = np.unravel_index(np.argmax(np.array(k[0::3, :])), (3, page.n))
+    motion = balanced(2e-4)
+    k = np.array(page.sliding.map(motion[0].size2())(*motion, 2e-4)[1][0::3, :])
+    link, instant = (int(i) for i in np.unravel_index(np.argmax(k), k.shape))
+    steps = np.linspace(-0.1, 0.1, 801)
     for delta, colour in DELTAS.items():
-        slow, steps = delta / (2 * np.pi), np.linspace(-0.05, 0.05, 401)
-        q, r, z = (part[:, int(point)] for part in balanced(slow))
+        slow = delta / (2 * np.pi)
+        q, r, z = (part[:, instant] for part in balanced(slow))
         v, k = page.sliding(q, r, z, slow)
         f, forces, rows = -k * v, [], []
-        for change in steps:
-            moved = z + ca.vertcat(change, 0, 0)
+        for step in steps:
+            moved = z + ca.vertcat(step, 0, 0)
             v, k = page.sliding(q, r, moved, slow)
             forces.append(float(page.balance(q, r, moved, -k * v)[0][0]))
-            rows.append(float((f / k + v)[3 * int(component)]))
+            rows.append(float((f / k + v)[3 * link]))
         literal.plot(steps, forces, color=colour, label=f"delta = {delta:g}")
         lifted.plot(steps, rows, color=colour)
     literal.set(xlabel="u less its balanced value", ylabel="force on the body, row (3)")
-    lifted.set(xlabel="u less its balanced value", ylabel="f / k + v of the resting link, row (2')")
+    lifted.set(xlabel="u less its balanced value", ylabel="f / k + v of a resting link, row (2')")
     literal.legend()
 
 
