@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import colloc
+from colloc.search.options import OPTIONS
 from scripts.program import command_line
 
 
@@ -18,7 +19,7 @@ def main() -> None:
         begin = time.process_time()
         best = colloc.solve(file)
         middle = time.process_time()
-        front = colloc.pareto_front(best.problem, best=best)
+        front = colloc.pareto_front(best.problem, best=best, starts=OPTIONS.reach_starts)
         solve, more = middle - begin, time.process_time() - middle
         print(f"{file}: solve {solve:.1f} s, front {more / solve:.1f} times that; {front}")
 

@@ -578,9 +578,10 @@ def solve(options: argparse.Namespace) -> int:
             cli.complain("no front, as the answer is not certified.")
         elif options.front:
             from colloc.commands.front import find_front
+            from colloc.search.options import OPTIONS
 
             with complaining("no front"):
-                how = {"best": solution, "starts": options.starts}
+                how = {"best": solution, "starts": options.starts or OPTIONS.reach_starts}
                 table = path.with_suffix(".front.csv")
                 _, facts["front"], lines, more = find_front(options, stated, table, **how)
                 records += more
