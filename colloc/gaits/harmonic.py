@@ -202,7 +202,7 @@ class Harmonic(LinearClass):
         return np.arange(n) / n
 
     def _basis(self, n_joint: int) -> np.ndarray:
-        return _series_basis(self, n_joint)
+        return _series_basis(self.harmonics, self.symmetry, n_joint)
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Fourier:
         with np.errstate(over="ignore", invalid="ignore"):  # a series refuses what is not finite
@@ -275,16 +275,16 @@ def shift_phase(gait: Fourier, phase: float) -> Fourier:
 
 
 @lru_cache(maxsize=64)
-def _series_basis(gaits: Harmonic, n_joint: int) -> np.ndarray:
+def _series_basis(harmonics: int, symmetry: str, n_joint: int) -> np.ndarray:
     """Parameters to the table of a series, ``(n_joint (2 K + 1), n_parameter)``."""
-    columns, n_function = [], 2 * gaits.harmonics + 1
+    columns, n_function = [], 2 * harmonics + 1
     for function, joint in product(range(n_function), range(n_joint)):
         harmonic, sine = (function + 1) // 2, function > 0 and function % 2 == 0
         column, partner = np.zeros((n_joint, n_function)), n_joint - 1 - joint
         column[joint, function] = 1.0
-        if gaits.symmetry == ANTIPODAL and harmonic % 2 == 0:
+        if symmetry == ANTIPODAL and harmonic % 2 == 0:
             continue
-        if gaits.symmetry == BILATERAL:
+        if symmetry == BILATERAL:
             if partner < joint or (partner == joint and not sine):
                 continue
             column[partner, function] = 1.0 if sine else -1.0
