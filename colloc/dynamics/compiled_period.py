@@ -40,15 +40,16 @@ class CompiledPeriod:
         return bool(shapes.delta >= _DRY * np.abs(shapes.rates).max(initial=1.0))
 
     def simulate(
-        self, shapes: Shapes, start: np.ndarray
+        self, shapes: Shapes, start: np.ndarray, of: Shapes | None = None
     ) -> tuple[np.ndarray, np.ndarray, PeriodTotals] | None:
-        """Tail velocities ``(3, n_point)``, from those of `start`; (rotation rate, velocity of the
-        centre, power) over the pace, ``(4, n_point)``; totals. None if some balance is not
-        found."""
+        """Tail velocities ``(3, n_point)``, from those of `start`, moved along their derivatives
+        from the shapes `of` which they balance; (rotation rate, velocity of the centre, power) over
+        the pace, ``(4, n_point)``; totals. None if some balance is not found."""
         z, out = np.empty((3, self._n_point)), np.empty((4, self._n_point))
         totals, lost = np.empty(4), np.empty(1, dtype=np.int64)
-        start = np.ascontiguousarray(start)
-        self._call("colloc_period", shapes, start, _TOLERANCE, z, out, totals, lost)
+        begin = [np.ascontiguousarray(each) for each in (of or shapes)[:2]]
+        begin += [(of or shapes).delta, np.ascontiguousarray(start)]
+        self._call("colloc_period", shapes, *begin, _TOLERANCE, z, out, totals, lost)
         x, y, rotation, work = totals.tolist()
         return None if lost[0] else (z, out, PeriodTotals(complex(x, y), rotation, work))
 

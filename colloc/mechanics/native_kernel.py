@@ -58,7 +58,7 @@ _SIGNATURES = {
     "colloc_motion": "ppppp",
     "colloc_momenta": "pdpipp",
     "colloc_repeating": "pdnippppppp",
-    "colloc_period": "nippppdp" + "pdpppp",
+    "colloc_period": "nippppdp" + "ppdpdpppp",
     "colloc_period_vjp": "nippppdp" + "ppippp",
 }
 _SLOW = (

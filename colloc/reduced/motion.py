@@ -105,7 +105,7 @@ class ReducedMotion:
         begin, compiled = self._differentiated or last, self._compiled
         self.solves += 1
         if compiled is not None and begin is not None and compiled.covers(shapes):
-            found = compiled.simulate(shapes, begin.z)
+            found = compiled.simulate(shapes, begin.z, begin.shapes)
             if found is not None:
                 z, out, totals = found
                 self._last = _State(*of_v, z, out, None, totals)

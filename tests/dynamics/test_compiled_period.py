@@ -85,3 +85,20 @@ def test_a_shape_that_is_no_number_has_no_motion():
     compiled, shapes, rest = five_links()
     shapes.angles[1, 5] = np.nan
     assert compiled.simulate(shapes, rest) is None
+
+
+def test_velocities_to_start_from_miss_by_the_square_of_the_change(monkeypatch):
+    """They follow the branch they are on, where several velocities balance a body."""
+    compiled, shapes, rest = five_links()
+    begin, *_ = compiled.simulate(shapes, rest)
+    rng, missed = np.random.default_rng(0), []
+    changes = [rng.normal(size=each.shape) for each in shapes[:2]]
+    for h in (1e-3, 1e-4):
+        there = Shapes(*(each + h * by for each, by in zip(shapes[:2], changes, strict=True)), 1e-4)
+        balanced, *_ = compiled.simulate(there, rest)
+        with monkeypatch.context() as patch:
+            patch.setattr("colloc.dynamics.compiled_period._TOLERANCE", 1e12)
+            predicted, *_ = compiled.simulate(there, begin, shapes)
+        missed.append(float(np.median(np.abs(predicted - balanced))))
+    assert missed[0] < 1e-5
+    assert missed[1] == pytest.approx(missed[0] / 100, rel=0.2)

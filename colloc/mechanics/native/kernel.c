@@ -185,22 +185,26 @@ static bool rescue(const Played *b, State *s, ptrdiff_t t, const double *start, 
 
 #include "period.h"
 
-/* Motion through a period from tail velocities `start` (3, n_time): those in balance `z` (3, n_time), out (OUTPUTS, n_time), and the
-   totals. `lost`: the number of instants without a balance. */
+/* Motion through a period, begun from another one: its angles, rates, delta and tail velocities `start` (3, n_time). Velocities in
+   balance `z` (3, n_time), out (OUTPUTS, n_time), and the totals. `lost`: the number of instants without a balance. */
 FOR_EVERY_PROCESSOR
-int colloc_period(CHAIN, MESH, const double *start, double tolerance, double *z, double *out, double *totals, long long *lost)
+int colloc_period(
+    CHAIN, MESH, const double *start_angles, const double *start_rates, double start_delta, const double *start, double tolerance,
+    double *z, double *out, double *totals, long long *lost)
 {
-    Played played = PLAYED;
+    Played played = PLAYED, other = PLAYED;
     const Mesh mesh = MESHED;
     Room room = {0};
     const bool ready = new_room(&played) && new_lanes(&room, n, &played.law);
     State state = {.law = played.law, .link = played.link, .now = played.k, .trial = played.k + n};
     double *turned = malloc(2 * (size_t)(n_interval * s) * sizeof *turned);
+    other.angles = start_angles, other.rates = start_rates, other.delta = start_delta;
     *lost = 0;
     for (ptrdiff_t t = first; t < last && ready && turned; t += LANES) {
         Vector3 velocity;
         Lanes own_delta;
-        const Lanes speed = lane_instants(&played, &room, t, start, velocity, &own_delta);
+        predict_tail(&other, &room, t, start, angles, rates, z);
+        const Lanes speed = lane_instants(&played, &room, t, z, velocity, &own_delta);
         const Mask at_rest = lane_balance(n, &room, &played.law, own_delta, tolerance, velocity);
         if (ANY(~at_rest)) {
             tail_velocity(room.link, room.k, velocity);
@@ -208,7 +212,7 @@ int colloc_period(CHAIN, MESH, const double *start, double tolerance, double *z,
                 double tail[3];
                 if (at_rest[i])
                     continue;
-                *lost += !rescue(&played, &state, t + i, start, tolerance, tail);
+                *lost += !rescue(&played, &state, t + i, z, tolerance, tail);
                 for (int j = 0; j < 3; ++j)
                     velocity[j][i] = tail[j] / speed[i];
             }

@@ -151,6 +151,59 @@ static inline Lanes lane_instants(const Played *b, Room *room, ptrdiff_t t, cons
     return speed;
 }
 
+/* Tail velocities (3, n_time), at times from t on, moved along their derivatives from where b states them, `tail`, to other angles and
+   rates: where several velocities balance a body, those of one branch. */
+static inline void predict_tail(const Played *b, Room *room, ptrdiff_t t, const double *tail, const double *angles, const double *rates, double *to)
+{
+    const int n = b->n, reference = n / 2;
+    Vector3 z, net = {ZERO, ZERO, ZERO}, dz;
+    Matrix3 left, inverse;
+    Lanes delta, phi[n], w[n], x[n], y[n], vx[n], vy[n];
+    const Lanes speed = lane_instants(b, room, t, tail, z, &delta);
+    const Link *link = room->link;
+    const Sliding *k = room->k;
+    evaluate(n, link, room->k, reference, z, &b->law, delta);
+    pull_back(n, link, k, &b->law, delta, true, left);
+    inverse3(left, inverse);
+    phi[0] = w[0] = ZERO;
+    for (int i = 1; i < n; ++i) {
+        const ptrdiff_t row = (i - 1) * b->n_time;
+        phi[i] = phi[i - 1] + lane_load(angles + row, t, b->n_time) - lane_load(b->angles + row, t, b->n_time);
+        w[i] = w[i - 1] + (lane_load(rates + row, t, b->n_time) - lane_load(b->rates + row, t, b->n_time)) / speed;
+    }
+    const Lanes turning = w[reference];
+    for (int i = 0; i < n; ++i)
+        w[i] -= turning;
+    x[reference] = y[reference] = vx[reference] = vy[reference] = ZERO;
+    for (int side = 1; side >= -1; side -= 2)
+        for (int i = reference + side; i >= 0 && i < n; i += side) {
+            x[i] = x[i - side], y[i] = y[i - side], vx[i] = vx[i - side], vy[i] = vy[i - side];
+            for (int q = i - side; q != i + side; q += side) {
+                const Lanes half = ZERO + 0.5 * side * link[q].length, c = half * link[q].cos, s = half * link[q].sin;
+                x[i] -= s * phi[q], y[i] += c * phi[q];
+                vx[i] -= s * w[q] + c * k[q].w * phi[q], vy[i] += c * w[q] - s * k[q].w * phi[q];
+            }
+        }
+    for (int i = 0; i < n; ++i) {
+        const Lanes c = link[i].cos, s = link[i].sin, fx = k[i].fs * c - k[i].fn * s, fy = k[i].fs * s + k[i].fn * c;
+        const Vector3 d = {vx[i] * c + vy[i] * s + k[i].vn * phi[i], vy[i] * c - vx[i] * s - k[i].vs * phi[i], w[i]};
+        Vector3 df;
+        Matrix3 K;
+        find_slopes(&k[i], &b->law, &link[i], delta, false, K);
+        for (int row = 0; row < 3; ++row)
+            df[row] = -(K[row][0] * d[0] + K[row][1] * d[1] + K[row][2] * d[2]);
+        const Lanes dfx = df[0] * c - df[1] * s - phi[i] * fy, dfy = df[0] * s + df[1] * c + phi[i] * fx;
+        net[0] += dfx, net[1] += dfy;
+        net[2] += x[i] * fy - y[i] * fx + link[i].x * dfy - link[i].y * dfx + df[2];
+    }
+    for (int i = 0; i < 3; ++i)
+        dz[i] = inverse[i][0] * net[0] + inverse[i][1] * net[1] + inverse[i][2] * net[2];
+    const Lanes rate = w[0] + dz[2];
+    const Vector3 change = {vx[0] + dz[0] - link[0].y * dz[2], vy[0] + dz[1] + link[0].x * dz[2] - 0.5 * link[0].length * rate, rate};
+    for (int i = 0; i < 3; ++i)
+        lane_store(to + i * b->n_time, t, b->n_time, lane_load(tail + i * b->n_time, t, b->n_time) + change[i] * speed);
+}
+
 /* Length of the path, and the rate at which axes turn evenly, over the pace. */
 static double even_rate(const Mesh *m, double *length)
 {
