@@ -47,9 +47,10 @@ class CompiledPeriod:
         the pace, ``(4, n_point)``; totals. None if some balance is not found."""
         z, out = np.empty((3, self._n_point)), np.empty((4, self._n_point))
         totals, lost = np.empty(4), np.empty(1, dtype=np.int64)
-        begin = [np.ascontiguousarray(each) for each in (of or shapes)[:2]]
-        begin += [(of or shapes).delta, np.ascontiguousarray(start)]
-        self._call("colloc_period", shapes, *begin, _TOLERANCE, z, out, totals, lost)
+        of = of or shapes
+        angles, rates, start = map(np.ascontiguousarray, (of.angles, of.rates, start))
+        begin = angles, rates, of.delta, start, _TOLERANCE
+        self._call("colloc_period", shapes, *begin, z, out, totals, lost)
         x, y, rotation, work = totals.tolist()
         return None if lost[0] else (z, out, PeriodTotals(complex(x, y), rotation, work))
 
