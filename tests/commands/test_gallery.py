@@ -13,6 +13,9 @@ SLOW = 4.0
 """Files that took longer [s of processor time], or whose time is not known, are left to the slow
 tests."""
 
+CLOSE_OPTIMA = {"three_link_spline"}
+"""Classes so rich that rounding chooses between optima: 0.41348 and 0.41368 on four processors."""
+
 
 def cases():
     for example in examples():
@@ -31,6 +34,8 @@ def test_the_example_does_what_it_says(example, solved):
     if example.name in NUMBERS:
         before = NUMBERS[example.name]
         allowed = 3e-5 + 3 * (before["error"] + row["error"])
+        if example.name in CLOSE_OPTIMA:
+            allowed = example.reference.tolerance
         assert row["efficiency"] == pytest.approx(before["efficiency"], abs=allowed)
         assert row["status"] == before["status"]
 
