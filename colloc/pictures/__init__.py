@@ -3,11 +3,12 @@
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 
 def render(template: str, /, **values: Any) -> str:
     """Text of a template in `assets`; its filter ``g`` writes numbers to so many digits."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # which figures do not need
+
     templates = Environment(
         loader=PackageLoader("colloc.pictures", "assets"), autoescape=True,
         undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,

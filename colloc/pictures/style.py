@@ -67,8 +67,11 @@ def save(
     paths = [stem.with_name(f"{stem.name}.{kind}") for kind in kinds]
     for path, kind in zip(paths, kinds, strict=True):
         with replaced_file(path) as temporary, figure_style():
-            metadata = {"CreationDate": None} if kind == "pdf" else None
-            figure.savefig(temporary, format=kind, dpi=dpi, metadata=metadata)
+            how: Any = {
+                "pdf": {"metadata": {"CreationDate": None}},
+                "png": {"pil_kwargs": {"compress_level": 1}},  # a third quicker, a tenth larger
+            }
+            figure.savefig(temporary, format=kind, dpi=dpi, **how[kind])
         figure.set_layout_engine("none")  # the first layout holds for the others
     return paths
 
