@@ -80,6 +80,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
+    if "_ARGCOMPLETE" in os.environ:  # a shell completes a line (argcomplete)
+        words = _command_on_the_line()
     name = words[0] if words else ""
     if name in ("", "-h", "--help", "help"):
         print(help_text())
@@ -102,6 +104,22 @@ def _run(words: list[str]) -> int:
         f"do you mean colloc {hints[0]}?" if hints else f"choose one of {', '.join(SUBCOMMANDS)}."
     )
     raise ProblemError(f"there is no command {name!r}; {hint}")
+
+
+def _command_on_the_line() -> list[str]:
+    """The command whose parser completes the rest of the line; before its name ends, the names are
+    completed."""
+    import argcomplete
+
+    line, point = os.environ["COMP_LINE"], int(os.environ["COMP_POINT"])
+    command = [*argcomplete.split_line(line, point)[3], "", ""][1]
+    if command in SUBCOMMANDS:
+        os.environ["_ARGCOMPLETE"] = "2"  # the words before the options
+    else:
+        parser = Parser("colloc")
+        parser.add_argument("command", choices=SUBCOMMANDS)
+        argcomplete.autocomplete(parser)
+    return [command]
 
 
 class Parser(argparse.ArgumentParser):
@@ -129,6 +147,8 @@ def command(epilog: str, *options: Option) -> Callable[[Function], Callable[...,
             )
             for name, settings in (*options, *PRINTING):
                 parser.add_argument(name, **settings)
+            if "_ARGCOMPLETE" in os.environ:
+                importlib.import_module("argcomplete").autocomplete(parser)
             return run(parser, function, arguments)
 
         return call
