@@ -38,7 +38,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ORDER = {
     "Start": "index concepts",
     "Tutorial": "tutorial notebook gallery",
-    "How to": """howto/scripts howto/report howto/robot howto/motors howto/pace howto/slopes
+    "How to": """howto/scripts howto/report howto/robot howto/pace howto/motors howto/slopes
         howto/laws howto/steering howto/objectives howto/check howto/sensitivity howto/starts
         howto/studies howto/cluster howto/own_body howto/columns howto/own_gait_class howto/paper
         troubleshooting""",
