@@ -48,12 +48,10 @@ from scripts.models.period import period
 from scripts.program import command_line
 
 SWIMMER = Viscous(normal=drag.NORMAL, tangential=drag.TANGENTIAL)
-PAPER = "S. Alben, Efficient sliding locomotion with isotropic friction (2019)"
-THREE_LINKS = (
-    "S. Alben, Efficient sliding locomotion of three-link bodies, arXiv:2012.03379, abstract"
-)
-SNAKES = "S. Alben, Optimizing snake locomotion in the plane, Proc. R. Soc. A 469 (2013), abstract"
-COMMENT = "O. Raz and J. E. Avron, comment on Tam and Hosoi, arXiv:0706.3906"
+PAPER = "Alben 2019"
+THREE_LINKS = "Alben, arXiv:2012.03379"
+SNAKES = "Alben 2013"
+COMMENT = "Raz, Avron, arXiv:0706.3906"
 DISPLACED = (
     2.017955906441066, 1.353385144748382, 0.013112519773635,
     0.263823759269392, -0.031456173657342, -0.003626287235861,
@@ -134,9 +132,7 @@ def scallop() -> Row:
         return np.sin(2 * np.pi * t) * line, 2 * np.pi * np.cos(2 * np.pi * t) * line
 
     gone = replay(Chain(), SWIMMER, path, 1e-4, instants=80, most_instants=160).distance
-    source = (
-        "G. L. Wagner and E. Lauga, Crawling scallop, arXiv:1303.2669, abstract, on viscous fluids"
-    )
+    source = "Wagner, Lauga, arXiv:1303.2669, on viscous fluids"
     return Row(
         "retraced stroke", source, "no locomotion on average", f"d = {gone:.1g}", gone < 1e-12
     )
@@ -196,7 +192,7 @@ def strokes_of_others() -> list[Row]:
         rows.append(
             Row(
                 f"best moderate stroke: {what}",
-                f"coefficients in OSU-LRAM/GeometricSystemPlotter, shchf_LowRe_{name}.m; replayed",
+                f"GeometricSystemPlotter, shchf_LowRe_{name}.m; replayed",
                 f"{value(theirs):.6f}",
                 f"{value(ours):.6f}",
                 None if better else abs(gain) < 1e-3 * value(theirs),
@@ -210,7 +206,7 @@ def reversal() -> Row:
     found = minimize_scalar(circle, bounds=(1.5, 2.9), method="bounded", options={"xatol": 1e-6})
     ours = f"the circular stroke stands still at {found.x:.4f} rad"
     holds = found.fun < 1e-6 and min(circle(1.5), circle(2.9)) > 0.05
-    source = "O. Wiezel and Y. Or, arXiv:1603.02268, abstract"
+    source = "Wiezel, Or, arXiv:1603.02268"
     return Row("direction of large strokes", source, "reversal of the direction", ours, holds)
 
 
@@ -368,7 +364,7 @@ def link_ratio() -> Row:
     (small, gain), (large, more) = found
     return Row(
         "best link lengths of Purcell's swimmer",
-        "L. Giraldi, P. Martinon and M. Zoppello, arXiv:1412.8133, abstract",
+        "Giraldi and others, arXiv:1412.8133",
         "a gain in displacement of roughly 60 % over the classical design",
         f"{gain:.1f} % for small square strokes, {more:.1f} % with corners at 30°, of a middle link "
         f"{small:.3f} and {large:.3f} times the outer ones over one twice as long",
@@ -444,7 +440,7 @@ def slow(body: Chain, gait: Fourier) -> tuple[float, float, float]:
 
 def elastica() -> list[Row]:
     """PyElastica's snake at its optimum and by the gait of colloc."""
-    froude, paper, rows = snakes.FROUDE, "PyElastica 1.0.0, ContinuumSnakeCase, run here", []
+    froude, paper, rows = snakes.FROUDE, "PyElastica", []
     for who, (gait, nodes) in in_elastica().items():
         body, shown = snakes.shapes(nodes)
         published, bend = round(snakes.distance(nodes), 4), largest_bend(shown)
@@ -488,7 +484,7 @@ def kinematic() -> list[Row]:
         rows.append(
             number(
                 f"body lengths a period by the wave of its README, Froude number {froude:g}",
-                "kinematic-snake 1.0.0, run here",
+                "kinematic-snake",
                 round(snakes.kinematic_distance(froude), 5),
                 fine + (fine - coarse) / 3,
                 1e-4,
@@ -527,30 +523,30 @@ def document() -> str:
     best = swimmer(5, "bilateral").measured
     return f"""# Published results
 
-What papers say and other people's simulators do, beside what colloc gives. Nothing is adjusted to
-what is published. PyElastica and kinematic-snake are run, not quoted: `pip install {PROGRAMS}`.
+What papers say and other people's simulators do, beside what colloc gives. Nothing is adjusted.
+Simulators are run here: `pip install {PROGRAMS}`, the former with its ContinuumSnakeCase. Of papers
+with an arXiv number the abstract is quoted.
 
 ![Two snakes in PyElastica: its optimum by CMA-ES, and colloc's gait](assets/snakes.svg)
 
-The film shows both snakes in PyElastica, on the same floor at the same pace, bent as much; lines are
-a tenth of a body length apart. Moments are in units of weight times length. The gait of colloc needs
-a rod ten times as stiff to keep its shape, and more moment; the last row on PyElastica is colloc's
-best gait of ten links with the bend and moment of the example's shapes on ten links.
+Both snakes are in PyElastica, on the same floor at the same pace, bent as much; lines are a tenth of
+a body length apart. colloc's gait needs a rod ten times as stiff to keep its shape, and more moment
+[weight times length]; the last row on PyElastica is its best gait of ten links that bends no more and needs no more.
 
-The film and the table are made by `python -m benchmarks.published --output docs`; rows of some parts
-by their names, `python -m benchmarks.published elastica kinematic link_ratio wave_of_bending`.
+`python -m benchmarks.published --output docs` makes film and table; with names of parts, such as
+`elastica kinematic link_ratio wave_of_bending`, it prints their rows.
 
 {table(list(PARTS))}
 
 *Derived* rows have no printed number and are held against formulas written apart from the library.
-Purcell's swimmer has three equal links of length 1/3 and drag (2, 1) where nothing else is said; its
-efficiency is Lighthill's, d²/W at unit tangential drag in a period of 1. The best stroke of it found
-here: d²/W = {best.value:.5f}, five harmonics, bilateral, certified.
+Purcell's swimmer has three equal links and drag (2, 1) where nothing else is said; its efficiency is
+Lighthill's, d²/W at unit tangential drag in a period of 1. The best stroke of it found here:
+d²/W = {best.value:.5f}, five harmonics, bilateral, certified.
 
-Not in the table: Tam and Hosoi (2007), Becker, Koehler and Stone (2003), Raz and Avron (2008) and
-Jing and Alben (2013) print numbers, but not in a text that could be read for this page; and crawlers
-that stretch along a line (Gidoni, Noselli and DeSimone) or have inertia (Wagner and Lauga) are other
-bodies than those of colloc.
+Alben 2013: S. Alben, *Optimizing snake locomotion in the plane*, Proc. R. Soc. A 469, abstract. Alben
+2019: *Efficient sliding locomotion with isotropic friction*. Tam and Hosoi (2007), Becker, Koehler and
+Stone (2003), Raz and Avron (2008) and Jing and Alben (2013) print numbers, but not in a text that
+could be read for this page.
 """
 
 
