@@ -18,6 +18,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from colloc.numerics.mesh import Mesh
 
@@ -49,17 +51,11 @@ class CollocatedStates:
     """
 
     def __init__(
-        self,
-        mesh: Mesh,
-        free: np.ndarray,
-        image: np.ndarray | None = None,
-        unit: float = 1.0,
+        self, mesh: Mesh, free: np.ndarray, image: np.ndarray | None = None, unit: float = 1.0
     ) -> None:
-        self._shape = mesh.n, mesh.scheme.s
         self._a = unit * mesh.h[:, None, None] * mesh.scheme.A
         self._b = unit * mesh.h[:, None] * mesh.scheme.b
-        self._free = np.flatnonzero(free)
-        self._image = np.eye(len(free)) if image is None else image
+        self._free, self._image = free, np.eye(len(free)) if image is None else image
 
     @property
     def scheme(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -68,7 +64,7 @@ class CollocatedStates:
 
     def integrals(self, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """``H r`` at the points, ``(n_state, n_point)``, and over all, ``(n_state,)``."""
-        stages = rates.reshape(len(rates), *self._shape)
+        stages = rates.reshape(len(rates), *self._b.shape)
         gained = np.cumsum((self._b * stages).sum(axis=2), axis=1)
         before = np.concatenate([np.zeros((len(rates), 1)), gained[:, :-1]], axis=1)
         return (before[:, :, None] + self._within(stages)).reshape(rates.shape), gained[:, -1]
@@ -89,14 +85,14 @@ class CollocatedStates:
         `near` a guess of the states."""
         start = np.array(start, dtype=float)
         if near is None:
-            near = np.repeat(start[:, None], np.prod(self._shape), axis=1)
+            near = np.repeat(start[:, None], self._b.size, axis=1)
         x = np.column_stack([near, start])
         now, residual, off = self._residual(rates, x)
         next_step, trusted, astray = np.zeros_like(x), np.inf, 0
         for _ in range(_STEPS):
             if off < _CLOSED or not now.known:
                 break
-            newton = self._newton(now.on_states)
+            newton = self._linear(now.on_states).solve
             step = newton(residual)
             size = float(np.linalg.norm(step))
             if not np.isfinite(size):
@@ -143,35 +139,28 @@ class CollocatedStates:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """States of every interval by itself from begins ``(n_state, n)``; its ends ``(n_state,
         n)``; convergence ``(n,)``."""
-        n, s = self._shape
-        begin, share = np.repeat(begins, s, axis=1), np.ones(n)
+        n, s = self._b.shape
 
-        def by_interval(values: np.ndarray) -> np.ndarray:
-            """Largest magnitude, ``(n,)``."""
-            largest: np.ndarray = np.abs(values).reshape(-1, n, s).max(axis=(0, 2))
-            return largest
+        def largest(values: np.ndarray) -> np.ndarray:
+            return np.abs(values).reshape(-1, n, s).max(axis=(0, 2))
 
         def residual(states: np.ndarray) -> tuple[Rates, np.ndarray, np.ndarray]:
             now = rates(states)
             gained = self._within(now.value.reshape(-1, n, s)).reshape(states.shape)
-            left_over = states - begin - gained
-            return now, left_over, by_interval(left_over)
+            left_over = states - np.repeat(begins, s, axis=1) - gained
+            return now, left_over, largest(left_over)
 
-        (now, left_over, off), states = residual(near), near
+        (now, left_over, off), states, share = residual(near), near, np.ones(n)
         for _ in range(_MOST_ITERATIONS):
             if (off < _CLOSED).all():
                 break
-            linear = _Linear(self._a, self._b, now.on_states)
-            newton = linear.by_point(linear.stages(left_over))
-            step = np.repeat(share, s) * newton
-            trial = states - step
-            *_, off_then = residual(trial)
-            nearer = (off_then < off) | (by_interval(step) < _ROUNDED)
-            states = np.where(np.repeat(nearer, s), trial, states)
+            step = np.repeat(share, s) * self._linear(now.on_states).within(left_over)
+            nearer = (residual(states - step)[-1] < off) | (largest(step) < _ROUNDED)
+            states = np.where(np.repeat(nearer, s), states - step, states)
             share = np.where(nearer, np.minimum(2.0 * share, 1.0), 0.25 * share)
             now, left_over, off = residual(states)
-        found = now.value.reshape(-1, n, s)
-        return states, begins + (self._b * found).sum(axis=2), off < _FOUND
+        gained = (self._b * now.value.reshape(-1, n, s)).sum(axis=2)
+        return states, begins + gained, off < _FOUND
 
     def _within(self, stages: np.ndarray) -> np.ndarray:
         return np.einsum("nij,anj->ani", self._a, stages)
@@ -185,29 +174,10 @@ class CollocatedStates:
         gained, whole = self.integrals(now.value)
         closing = whole + (start - self._image @ start)
         residual = np.column_stack([states - start[:, None] - gained, closing])
-        off = max(np.abs(residual[:, :-1]).max(), np.abs(residual[self._free, -1]).max(initial=0.0))
+        off = max(
+            np.abs(residual[:, :-1]).max(), np.abs(residual[:, -1][self._free]).max(initial=0.0)
+        )
         return now, residual, float(off) if now.known else np.inf
-
-    @_FAR
-    def _newton(self, on_states: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """Map from residuals to Newton steps."""
-        within, free = _Linear(self._a, self._b, on_states), self._free
-
-        @_FAR
-        def step(residual: np.ndarray) -> np.ndarray:
-            own, through, gained = within.condense(residual[:, :-1])
-            start = np.zeros(len(residual))
-            if free.size:
-                off = residual[free, -1] - gained[-1, free]
-                start[free] = np.linalg.solve(self._open(through[-1]), off)
-            begins = through[:-1] @ start + gained[:-1]
-            return np.column_stack([within.at_points(own, begins), start])
-
-        return step
-
-    def _open(self, through: np.ndarray) -> np.ndarray:
-        """``d s_end / d s_0 - M`` of the free states."""
-        return (through - self._image)[np.ix_(self._free, self._free)]
 
     def vjp(
         self, on_states: np.ndarray, of_states: np.ndarray
@@ -216,92 +186,72 @@ class CollocatedStates:
         n_state, n_point)`` and the states at the ends of intervals ``(m, n_state, n)``, from
         `of_states` ``(m, n_state, n_point)`` and the rates' derivatives `on_states` ``(n_state,
         n_state, n_point)``."""
-        within = _Linear(self._a, self._b, on_states)
-        on_start, on_rates, on_ends = within.vjp(of_states)
-        if self._free.size:
-            free, k = self._free, on_start.shape[1]
-            through, *_ = within.vjp(np.zeros((k, *of_states.shape[1:])), np.eye(k))
-            closing = np.zeros_like(on_start)
-            closing[:, free] = -np.linalg.solve(self._open(through).T, on_start[:, free].T).T
-            on_start, on_rates, on_ends = within.vjp(of_states, closing)
-            on_start -= closing @ self._image
-        return on_start, on_rates, on_ends
+        return self._linear(on_states).vjp(of_states)
+
+    def _linear(self, on_states: np.ndarray) -> _Linear:
+        return _Linear(*self.scheme, self._free, on_states)
 
 
 class _Linear:
-    """``I - H R``, condensed to the begins of the intervals."""
+    """``I - H R``, condensed to the states at the edges: rows that close a period or say where it
+    starts, and for every interval ``end - through begin``."""
 
-    def __init__(self, a: np.ndarray, b: np.ndarray, on_states: np.ndarray) -> None:
-        (n, s), k = b.shape, len(on_states)
-        self._a, self._b, self._shape = a, b, (n, s, k)
+    @_FAR
+    def __init__(
+        self,
+        a: np.ndarray,
+        b: np.ndarray,
+        image: np.ndarray,
+        free: np.ndarray,
+        on_states: np.ndarray,
+    ) -> None:
+        (n, s), k, one = b.shape, len(free), np.eye(len(free))
+        self._a, self._b, self._free, self._shape = a, b, free, (n, s, k)
         # of an interval in order of stage, state
         slopes = on_states.reshape(k, k, n, s).transpose(2, 3, 0, 1)
         matrix = np.eye(s * k) - np.einsum("nij,njab->niajb", a, slopes).reshape(n, s * k, s * k)
         self._inverse = np.linalg.inv(matrix)
         self._gain = np.einsum("nj,njab->najb", b, slopes).reshape(n, k, s * k)
         self._response = self._inverse.reshape(n, s * k, s, k).sum(axis=2)
-        self._through = np.eye(k) + self._gain @ self._response
+        blocks = np.tile(one, (n + 1, 2, 1, 1))
+        blocks[0] = np.where(free[:, None], -image, one), np.diag(free)
+        blocks[1:, 0] += self._gain @ self._response
+        blocks[1:, 0] *= -1.0
+        columns = np.append([0, n], np.arange(n)[:, None] + [0, 1])
+        rows = blocks.reshape(-1, k, k), columns, np.arange(0, 2 * n + 3, 2)
+        self._edges = splu(sparse.bsr_matrix(rows).tocsc())
 
     def _by_interval(self, at_points: np.ndarray) -> np.ndarray:
         n, s, k = self._shape
-        return np.moveaxis(at_points.reshape(*at_points.shape[:-2], k, n, s), -3, -1).reshape(
-            *at_points.shape[:-2], n, s * k
-        )
+        return at_points.reshape(-1, k, n, s).transpose(0, 2, 3, 1).reshape(-1, n, s * k)
 
-    def by_point(self, by_interval: np.ndarray) -> np.ndarray:
+    def _by_point(self, by_interval: np.ndarray) -> np.ndarray:
         n, s, k = self._shape
-        return np.moveaxis(by_interval.reshape(*by_interval.shape[:-2], n, s, k), -1, -3).reshape(
-            *by_interval.shape[:-2], k, n * s
-        )
+        return by_interval.reshape(-1, n, s, k).transpose(0, 3, 1, 2).reshape(-1, k, n * s)
 
-    def stages(self, right: np.ndarray) -> np.ndarray:
-        """Stages for a right side ``(k, n_point)`` with zero begins, ``(n, s k)``."""
-        return (self._inverse @ self._by_interval(right)[:, :, None])[:, :, 0]
+    def within(self, right: np.ndarray) -> np.ndarray:
+        """Solution ``(k, n_point)`` of every interval by itself, from a begin of 0."""
+        return self._by_point(np.einsum("nij,mnj->mni", self._inverse, self._by_interval(right)))[0]
 
-    def condense(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Stages of a right side with zero begins, and states at the edges as ``through @ begin +
-        gained``."""
-        own, k = self.stages(right), len(right)
-        more = self._gain @ own[:, :, None]
-        through, gained = _prefix_products(
-            self._through.transpose(0, 2, 1), more.transpose(0, 2, 1)
-        )
-        begin = np.eye(k, k + 1)[None]
-        edges = np.concatenate(
-            [begin, np.concatenate([through, gained], axis=1).transpose(0, 2, 1)]
-        )
-        return own, edges[:, :, :-1], edges[:, :, -1]
+    @_FAR
+    def solve(self, residual: np.ndarray) -> np.ndarray:
+        """Solution at the points and at the begin, ``(k, n_point + 1)``."""
+        own, k = self.within(residual[:, :-1]), len(residual)
+        gained = np.einsum("nai,mni->na", self._gain, self._by_interval(own))
+        right = np.append(np.where(self._free, residual[:, -1], 0.0), gained)
+        edges = self._edges.solve(right).reshape(-1, k)
+        more = self._by_point(np.einsum("nia,na->ni", self._response, edges[:-1]))[0]
+        return np.column_stack([own + more, edges[0]])
 
-    def at_points(self, own: np.ndarray, begins: np.ndarray) -> np.ndarray:
-        """States ``(k, n_point)`` from those at the begins of the intervals, ``(n, k)``."""
-        return self.by_point(own + (self._response @ begins[:, :, None])[:, :, 0])
-
-    def vjp(
-        self, of_states: np.ndarray, of_end: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Adjoint: along the begin ``(m, k)``, the rates, ``H'(I - H R)'^-1``, ``(m, k, n_point)``,
-        and the states at the ends of intervals ``(m, k, n)``."""
+    def vjp(self, of_states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`CollocatedStates.vjp`: along the rates it is ``H'(I - H R)'^-1``."""
         (n, s, k), given = self._shape, self._by_interval(of_states)
-        through = np.einsum("mni,nia->mna", given, self._response)
-        end = np.zeros((len(given), k)) if of_end is None else of_end
-        back, gained = _prefix_products(self._through[::-1], through.transpose(1, 0, 2)[::-1])
-        before = end @ back + gained
-        later = np.concatenate([end[None], before[:-1]])[::-1].transpose(1, 0, 2)
-        mu = np.einsum(
-            "mni,nij->mnj", given + np.einsum("mna,nai->mni", later, self._gain), self._inverse
-        )
-        stages = mu.reshape(-1, n, s, k)
-        on_rates = (
-            np.einsum("mnia,nij->mnja", stages, self._a) + self._b[:, :, None] * later[:, :, None]
-        )
-        return before[-1], self.by_point(on_rates.reshape(-1, n, s * k)), later.transpose(0, 2, 1)
-
-
-def _prefix_products(t: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Prefix products of affine maps ``x -> x t + c`` in log2 n steps."""
-    t, c, reach = t.copy(), c.copy(), 1
-    while reach < len(t):
-        c[reach:] += c[:-reach] @ t[reach:]
-        t[reach:] = t[:-reach] @ t[reach:]
-        reach *= 2
-    return t, c
+        right = np.zeros((len(given), n + 1, k))
+        right[:, :-1] = np.einsum("mni,nia->mna", given, self._response)
+        edges = self._edges.solve(right.reshape(-1, (n + 1) * k).T, "T").T.reshape(right.shape)
+        later, given = edges[:, 1:], given + np.einsum("mna,nai->mni", edges[:, 1:], self._gain)
+        stages = np.einsum("mni,nij->mnj", given, self._inverse).reshape(-1, n, s, k)
+        on_rates = np.einsum("mnia,nij->mnja", stages, self._a)
+        on_rates += self._b[:, :, None] * later[:, :, None]
+        on_start = np.where(self._free, 0.0, edges[:, 0])
+        return on_start, self._by_point(on_rates), later.transpose(0, 2, 1)

@@ -100,12 +100,14 @@ def test_half_a_period_and_its_image_are_the_whole():
     np.testing.assert_allclose(np.concatenate([first, -first], axis=1), both, atol=1e-11)
 
 
-def test_where_states_grow_beyond_all_numbers_no_motion_is_found_and_none_is_warned_of():
-    """Fourteenfold in each of 300 intervals."""
+def test_a_periodic_motion_is_found_where_others_grow_beyond_all_numbers():
+    """Fourteenfold in each of 300 intervals: none but the constant one repeats itself."""
     mesh = Mesh(scheme("gauss-2"), np.linspace(0.0, 1.0, 301))
     growth, equations = 3.46 * mesh.n, CollocatedStates(mesh, free=np.ones(1, dtype=bool))
     slope = np.full((1, 1, mesh.n_point), growth)
-    assert not equations.solve(lambda s: Rates(growth * s + 1.0, slope), np.zeros(1))[2]
+    states, _, held = equations.solve(lambda s: Rates(growth * s + 1.0, slope), np.zeros(1))
+    assert held
+    np.testing.assert_allclose(states, -1.0 / growth, rtol=1e-12)
 
 
 def test_a_slow_motion_down_a_steep_slope_is_found_where_steps_run_out_of_what_balances():
