@@ -31,7 +31,7 @@ from colloc.system.errors import ProblemError
 DELTA, _SAMPLED = 1e-9, 1e-6
 """At unit shape speed: Coulomb friction to 1e-8, and within reach of the solver; samples take half
 the time at the second, at which the best small gait loses 1.5e-5."""
-MOST_LINKS = 5  # samples fill all of shape space
+_MOST_LINKS = 5  # samples fill all of shape space
 _MAX_ITERATIONS = 300  # the few motions that need more are left out
 _SINGULAR = 1e-9  # singular value of relative motions along which two links do not move
 _BISECTIONS = 30
@@ -133,7 +133,7 @@ def fundamental(body: Chain, angles: np.ndarray) -> np.ndarray:
 def one_joint(n_joint: int, half: bool) -> np.ndarray:
     """Rates ``(n_joint, count)`` of each joint alone: where the other links stick the ratio of gain
     to power has a peak with a kink, so steep that no lattice of directions sees it."""
-    return np.eye(n_joint) if half else np.concatenate([np.eye(n_joint), -np.eye(n_joint)], axis=1)
+    return np.kron([[1.0]] if half else [[1.0, -1.0]], np.eye(n_joint))
 
 
 def two_resting(
@@ -178,7 +178,7 @@ def unit_directions(n_joint: int, count: int, half: bool, shift: float = 0.0) ->
     """About `count` directions ``(n_joint, count)`` spread over the sphere, or half of it; of two
     joints moved by the part `shift` of their spacing."""
     if n_joint == 1:
-        return np.array([[1.0]]) if half else np.array([[1.0, -1.0]])
+        return one_joint(1, half)
     if n_joint == 2:
         turn = (np.arange(count) + shift) * ((np.pi if half else 2 * np.pi) / count)
         return np.stack([np.cos(turn), np.sin(turn)])
@@ -199,7 +199,7 @@ class SmallGait(NamedTuple):
         order = np.argsort(np.arctan2(self.rates[-1], self.rates[0]))[:: -1 if back else 1]
         sides = (self.rates * self.weights)[:, order]
         corners = np.cumsum(sides, axis=1)
-        corners = corners - corners.mean(axis=1, keepdims=True)
+        corners -= corners.mean(axis=1, keepdims=True)
         return shape[:, None] + size * corners / np.linalg.norm(sides, axis=0).sum()
 
 
@@ -229,6 +229,13 @@ class Domain:
     joint_limit: float
 
     def __post_init__(self) -> None:
+        if not 0 < self.joint_limit <= np.pi + 1e-12:
+            raise ProblemError(f"joint_limit must lie in (0, pi], not {self.joint_limit:g}.")
+        if self.body.n_link > _MOST_LINKS:
+            raise ProblemError(
+                f"upper bounds are computed for at most {_MOST_LINKS} links, not "
+                f"{self.body.n_link}; there is 1/min(mu)."
+            )
         if self.body.feet and not self.law.associated:
             raise ProblemError(
                 f"on feet no upper bound is computed for {self.law.label}: its motions are not "

@@ -6,7 +6,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colloc.bounds.motions import MOST_LINKS, Domain
+from colloc.bounds.motions import Domain
 from colloc.gaits.limits import widest
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
@@ -32,19 +32,17 @@ def refusal(problem: Problem) -> str:
             "upper bounds are computed for chains of links under Coulomb friction, or the elliptic "
             "law, only; for this one there is 1/min(mu)."
         )
-    if problem.body.feet and not problem.law.associated:
-        return (
-            f"on feet no upper bound is computed for {problem.law.label}: its motions are not "
-            f"unique; there is 1/min(mu)."
-        )
     if not _has_bound(problem):
         return "upper bounds are of the efficiency, on the level, of gaits that do not turn."
-    if problem.body.n_link > MOST_LINKS:
-        return (
-            f"upper bounds are computed for at most {MOST_LINKS} links, not "
-            f"{problem.body.n_link}; there is 1/min(mu)."
-        )
+    try:
+        _domain(problem)
+    except ProblemError as error:
+        return str(error)
     return ""
+
+
+def _domain(problem: Problem) -> Domain:
+    return Domain(problem.body, problem.friction, widest(problem.joint_limit))  # type: ignore[arg-type]
 
 
 def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | None:
@@ -61,15 +59,15 @@ def upper_bound(problem: Problem, folder: Path, *, compute: bool) -> Bound | Non
         return None
     from colloc.bounds.sampled import efficiency_bound, known_bound, usual_budget
 
-    at = problem.body, problem.friction, widest(problem.joint_limit)
+    domain = _domain(problem)
+    at = domain.body, domain.friction, domain.joint_limit
     try:
         if compute:
-            return efficiency_bound(*at, cache=cache)  # type: ignore[arg-type]
-        domain = Domain(*at)  # type: ignore[arg-type]
+            return efficiency_bound(*at, cache=cache)
         return known_bound(domain, usual_budget(domain), cache)
     except StoreError as error:
         warnings.warn(f"{error} No bound is taken from it.", ReadOnlyRunWarning, stacklevel=2)
-        return efficiency_bound(*at) if compute else None  # type: ignore[arg-type]
+        return efficiency_bound(*at) if compute else None
 
 
 def gap_line(

@@ -81,56 +81,35 @@ class TensorSpline:
     def cell(self, angle: np.ndarray) -> np.ndarray:
         return np.clip(np.searchsorted(self.knots, angle, side="right") - 1, 0, self.intervals - 1)
 
-    def _pieces(self, angle: np.ndarray, order: int) -> np.ndarray:
-        """Derivatives ``(n, 4)`` of the functions of one joint that live at an angle."""
-        every = BSpline(self.extend, np.eye(self.per_joint), DEGREE)(angle, nu=order)
-        return np.take_along_axis(every, self.cell(angle)[:, None] + np.arange(DEGREE + 1), axis=1)
-
-    def matrix(
-        self, angles: np.ndarray, orders: tuple[int, ...] | None = None
-    ) -> sparse.csr_matrix:
-        """Functions, or partial derivatives of given orders, at angles ``(n_joint, n)``, ``(n,
-        size)``."""
-        orders = orders or (0,) * self.n_joint
-        pieces = [self._pieces(*each) for each in zip(angles, orders, strict=True)]
-        return self._columns(angles, reduce(_products, pieces))
-
-    def slope(self, angles: np.ndarray, rates: np.ndarray) -> sparse.csr_matrix:
-        """Rates of change of all functions for joint rates ``(n_joint, n)``, ``(n, size)``."""
-        value, change = np.ones((angles.shape[1], 1)), np.zeros((angles.shape[1], 1))
+    def matrices(
+        self, angles: np.ndarray, rates: np.ndarray
+    ) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """All functions at angles ``(n_joint, n)``, and their rates of change, ``(n, size)``."""
+        n, one = angles.shape[1], BSpline(self.extend, np.eye(self.per_joint), DEGREE)
+        value, change, column = np.ones((n, 1)), np.zeros((n, 1)), np.zeros((n, 1), dtype=np.int32)
         for angle, rate in zip(angles, rates, strict=True):
-            pieces, steepness = (self._pieces(angle, order) for order in (0, 1))
-            change = _products(change, pieces) + _products(value, rate[:, None] * steepness)
-            value = _products(value, pieces)
-        return self._columns(angles, change)
-
-    def _columns(self, angles: np.ndarray, value: np.ndarray) -> sparse.csr_matrix:
-        """Put values ``(n, 4^n_joint)`` into the columns of their functions."""
-        n, width = value.shape
-        column = np.zeros((n, 1), dtype=np.int32)
-        for angle in angles:
-            local = self.cell(angle)[:, None, None] + np.arange(DEGREE + 1)
-            column = (column[:, :, None] * self.per_joint + local).reshape(n, -1)
-        rows = np.arange(n + 1) * width
-        return sparse.csr_matrix((value.ravel(), column.ravel(), rows), shape=(n, self.size))
+            alive = self.cell(angle)[:, None] + np.arange(DEGREE + 1)
+            at, steepness = (np.take_along_axis(one(angle, nu=k), alive, axis=1) for k in (0, 1))
+            change = _products(change, at) + _products(value, rate[:, None] * steepness)
+            value = _products(value, at)
+            column = (column[:, :, None] * self.per_joint + alive[:, None]).reshape(n, -1)
+        places, shape = (column.ravel(), np.arange(n + 1) * column.shape[1]), (n, self.size)
+        first, second = (
+            sparse.csr_matrix((entries.ravel(), *places), shape) for entries in (value, change)
+        )
+        return first, second
 
     @cached_property
     def roughness(self) -> sparse.csr_matrix:
         """Gram matrix of the second derivatives: ``c.roughness.c`` is about the integral of |D^2
         f|^2."""
-        half = 0.5 * np.diff(self.knots)
-        axis = (self.knots[:-1, None] + half[:, None] * np.array([0.5, 1.5])).ravel()
-        angles, widths = (
-            np.stack([a.ravel() for a in np.meshgrid(*[each] * self.n_joint, indexing="ij")])
-            for each in (axis, np.repeat(half, 2))
-        )
-        weights = sparse.diags(widths.prod(axis=0))
-        total, unit = sparse.csr_matrix((self.size, self.size)), np.eye(self.n_joint, dtype=int)
-        for one in unit:
-            for other in unit:
-                second = self.matrix(angles, tuple(one + other))
-                total = total + second.T @ weights @ second
-        return total.tocsr()
+        half, one = 0.5 * np.diff(self.knots), BSpline(self.extend, np.eye(self.per_joint), DEGREE)
+        places = (self.knots[:-1, None] + half[:, None] * np.array([0.5, 1.5])).ravel()
+        of_joint = (one(places, nu=order) for order in range(3))
+        grams = [sparse.csr_matrix(each.T * np.repeat(half, 2) @ each) for each in of_joint]
+        unit = np.eye(self.n_joint, dtype=int)
+        pairs = (a + b for a in unit for b in unit)
+        return sum(reduce(sparse.kron, [grams[k] for k in orders]) for orders in pairs).tocsr()
 
     def symmetric_basis(
         self, mirror: int, swap: int | None, together: int | None = None
@@ -147,7 +126,6 @@ class TensorSpline:
         for image, sign in group:
             average = average + sparse.csr_matrix((np.full(self.size, float(sign)), (every, image)))
         if together is not None and together < self.n_joint:
-            # functions of so many joints, for every choice
             of = sparse.csc_matrix(np.ones((self.per_joint, 1))), sparse.eye(self.per_joint)
             some = combinations(range(self.n_joint), together)
             choices = [[of[k in each] for k in range(self.n_joint)] for each in some]
@@ -259,8 +237,7 @@ class Samples:
 
     def __init__(self, space: PotentialSpace, motion: CoulombMotion) -> None:
         self.space, self.motion = space, motion
-        self.value = space.spline.matrix(motion.angles)
-        self.slope = space.spline.slope(motion.angles, motion.rates)
+        self.value, self.slope = space.spline.matrices(motion.angles, motion.rates)
 
     def add(self, motion: CoulombMotion) -> None:
         new = Samples(self.space, motion)

@@ -22,13 +22,7 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-from colloc.bounds.motions import (
-    MOST_LINKS,
-    CoulombMotion,
-    Domain,
-    climb_from_lattice,
-    near_the_top,
-)
+from colloc.bounds.motions import CoulombMotion, Domain, climb_from_lattice, near_the_top
 from colloc.bounds.potential import Measure, PotentialSpace, Samples, TensorSpline
 from colloc.gaits.gait_fields import fields, statement_hash
 from colloc.mechanics.chain import Chain
@@ -316,13 +310,6 @@ def efficiency_bound(
     """An upper bound on d/W over all gaits with |joint angles| <= joint_limit whose links do not
     cross, for delta -> 0; kept in an SQLite file `cache`, which if it cannot be written costs a
     warning."""
-    if not 0 < joint_limit <= np.pi + 1e-12:
-        raise ProblemError(f"joint_limit must lie in (0, pi], not {joint_limit:g}.")
-    if body.n_link > MOST_LINKS:
-        raise ProblemError(
-            f"bounds are computed for at most {MOST_LINKS} links, not {body.n_link}: the samples "
-            f"fill all of shape space."
-        )
     domain = Domain(body, friction, float(joint_limit))
     budget = budget or usual_budget(domain)
     if cache is not None and (known := known_bound(domain, budget, Path(cache))) is not None:

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 
 from colloc.bounds.potential import DEGREE, PotentialSpace, TensorSpline
 from research.guarantee.enclosure import CORNERS, Cells
@@ -40,7 +41,11 @@ def motions_at(points, seed=5):
 
 def value(potential, k, q, order=(0, 0)):
     """c_k or a derivative of it at one shape."""
-    return (potential.spline.matrix(np.asarray(q, dtype=float)[:, None], order) @ potential.c[k])[0]
+    t, every = potential.spline.extend, np.eye(potential.spline.per_joint)
+    return (
+        np.kron(*(BSpline(t, every, DEGREE)(*each) for each in zip(q, order, strict=True)))
+        @ potential.c[k]
+    )
 
 
 def cubic(t, i, x, degree=DEGREE):
@@ -153,7 +158,9 @@ def test_bounds_of_derivatives_are_the_hull_of_their_coefficients(potential, ord
     at = np.stack([axis.ravel() for axis in np.meshgrid(*[np.linspace(-np.pi, np.pi, 29)] * 2)])
     monomial = at[0] ** a * at[1] ** b
     whole.c = {
-        1: np.linalg.lstsq(spline.matrix(at).toarray(), monomial.astype(complex), rcond=None)[0]
+        1: np.linalg.lstsq(
+            spline.matrices(at, at)[0].toarray(), monomial.astype(complex), rcond=None
+        )[0]
     }
     factorial = np.prod(np.arange(1, a + 1)) * np.prod(np.arange(1, b + 1))
     np.testing.assert_allclose(whole.largest[1, order], factorial, rtol=1e-7)
