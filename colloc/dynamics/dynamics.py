@@ -15,20 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from colloc.dynamics.branches import on_one_branch
 from colloc.dynamics.chain import balance_on_slope, momenta_at
-from colloc.dynamics.collocated import (
-    CollocatedPose,
-    heading,
-    momenta_image,
-    stage_weights,
-    sums,
-)
+from colloc.dynamics.collocated import CollocatedPose, heading, momenta_image, stage_weights
 from colloc.dynamics.states import CollocatedStates, Rates
 from colloc.gaits.period import chord_per_way
 from colloc.gaits.regime import LEVEL, Regime, checked_chain
@@ -170,32 +164,34 @@ class QuasiStatic:
         """Instants for formulas, at orientations ``(n,)`` and tail velocities ``(3, n)``, by
         default balanced ones."""
         at = self.law, shapes.angles, shapes.rates, shapes.delta
-        z = self.body.solve(*at).z if z is None else z
-        return Instants(self.body, *at, z=z, unit=shapes.unit, joint_map=self.joint_map)
+        body, load = self.body, self.regime.pull(theta[None])
+        if z is None:
+            balance: Any = body.solve if load is None else partial(solve_balance, body, load=load)
+            z = balance(*at).z
+        joints = self.joint_map
+        return Instants(body, *at, z=z, unit=shapes.unit, load=load, joint_map=joints)
 
     def totals(self, passed: PeriodTotals) -> dict[str, float]:
-        """Totals of a whole period."""
-        along, chords = self._axis(passed), self.periods * chord_per_way(self.turn)
-        return {
-            "distance": chords * float((passed.displacement * np.conj(along)).real),
-            "work": self.periods * passed.work,
-            "rotation": passed.rotation + self.turn,
+        """Totals of a whole period; those but the rotation are linear but for the direction of
+        travel."""
+        gradients = self.total_gradients(passed).items()
+        found = {
+            name: float((np.conj(each.side) * passed.displacement).real + each.work * passed.work)
+            for name, each in gradients
         }
+        return found | {"rotation": passed.rotation + self.turn}
 
     def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
         """Gradients of `totals`."""
-        along, chords = self._axis(passed), self.periods * chord_per_way(self.turn)
+        along = np.exp(1j * heading(self.symmetry, passed.displacement, passed.rotation))
+        side = self.periods * chord_per_way(self.turn) * along
         # the axis turns with the solved part
         turns = 0.5 if self.symmetry == ANTIPODAL else 0.0
-        aside = chords * (passed.displacement * np.conj(along)).imag
         return {
-            "distance": TotalGradient(chords * along, turns * aside),
+            "distance": TotalGradient(side, turns * (passed.displacement * np.conj(side)).imag),
             "work": TotalGradient(work=self.periods),
             "rotation": TotalGradient(rotation=1.0),
         }
-
-    def _axis(self, passed: PeriodTotals) -> complex:
-        return complex(np.exp(1j * heading(self.symmetry, passed.displacement, passed.rotation)))
 
     def initial_heading(self, static: np.ndarray) -> float:
         """Initial orientation; 0 where it is no state."""
@@ -298,23 +294,10 @@ class OnSlope(QuasiStatic):
         slopes = now.on_shape, now.on_theta[:, None]
         return Trajectory(static, now.now, np.full(mesh.n_point, held), lambda: slopes, states)
 
-    def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
-        at = (self.law, shapes.angles, shapes.rates, shapes.delta)
-        load = self.regime.pull(theta[None])
-        z = solve_balance(self.chain, *at, load=load).z if z is None else z
-        return Instants(self.body, *at, z=z, unit=shapes.unit, load=load)
-
     def totals(self, passed: PeriodTotals) -> dict[str, float]:
         """Totals; NaN where the joints brake."""
-        way = self.regime.travel_along(passed.displacement)
-        work = passed.work + self.regime.grade * passed.displacement.real
-        found = {
-            "distance": way.real,
-            "work": work,
-            "rotation": passed.rotation,
-            "across": way.imag,
-        }
-        return {name: float(value) if work > 0 else np.nan for name, value in found.items()}
+        found = super().totals(passed)
+        return found if found["work"] > 0 else dict.fromkeys(found, np.nan)
 
     def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
         ahead = np.exp(1j * self.regime.ahead)
@@ -363,9 +346,6 @@ class Inertial(QuasiStatic):
     def _n_period(self) -> int:
         return int(self.regime.free is not None)
 
-    def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
-        return self.slow.instants(shapes, theta, z)
-
     def totals(self, passed: PeriodTotals) -> dict[str, float]:
         timed = {"period": float(np.exp(passed.static[0]))} if self._n_period else {}
         return self.slow.totals(passed) | timed
@@ -395,10 +375,8 @@ class Inertial(QuasiStatic):
             return self.simulate(mesh, shapes, static)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
-        gained = shapes.unit * (stage_weights(mesh) * rates[:, mesh.points]).sum(axis=2)
-        before = self.equations(mesh, shapes.unit).integrals(rates)[0][:, 0]
-        first = states[_MOMENTA, 0] - before
-        edges = np.stack([sums(row, start) for row, start in zip(gained, first, strict=True)])
+        gained, edges = self.equations(mesh, shapes.unit).integrals(rates)
+        edges = edges + (states[_MOMENTA, :1] - gained[:, :1])
 
         def slopes() -> tuple[np.ndarray, np.ndarray]:
             """A free pace has a column after the momenta: a longer period changes them by more."""

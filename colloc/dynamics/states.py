@@ -63,11 +63,10 @@ class CollocatedStates:
         return self._a, self._b, self._image
 
     def integrals(self, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """``H r`` at the points, ``(n_state, n_point)``, and over all, ``(n_state,)``."""
+        """``H r`` at the points, ``(n_state, n_point)``, and at the edges, ``(n_state, n + 1)``."""
         stages = rates.reshape(len(rates), *self._b.shape)
-        gained = np.cumsum((self._b * stages).sum(axis=2), axis=1)
-        before = np.concatenate([np.zeros((len(rates), 1)), gained[:, :-1]], axis=1)
-        return (before[:, :, None] + self._within(stages)).reshape(rates.shape), gained[:, -1]
+        edges = np.cumsum(np.pad((self._b * stages).sum(axis=2), ((0, 0), (1, 0))), axis=1)
+        return (edges[:, :-1, None] + self._within(stages)).reshape(rates.shape), edges
 
     def solve(
         self,
@@ -171,8 +170,8 @@ class CollocatedStates:
         """Rates, residuals at the points and (of free states) at the end, and the largest."""
         states, start = x[:, :-1], x[:, -1]
         now = rates(states)
-        gained, whole = self.integrals(now.value)
-        closing = whole + (start - self._image @ start)
+        gained, edges = self.integrals(now.value)
+        closing = edges[:, -1] + (start - self._image @ start)
         residual = np.column_stack([states - start[:, None] - gained, closing])
         off = max(
             np.abs(residual[:, :-1]).max(), np.abs(residual[:, -1][self._free]).max(initial=0.0)

@@ -136,7 +136,6 @@ class OwnLaw:
 
     @property
     def formulas(self) -> tuple[str, ...]:
-        """Force along and across."""
         return self.tangential, self.normal
 
     @property
@@ -145,7 +144,6 @@ class OwnLaw:
 
     @property
     def label(self) -> str:
-        """A short name."""
         return "own law of friction"
 
     def describe(self) -> str:
@@ -156,7 +154,6 @@ class OwnLaw:
 
     @cached_property
     def degree(self) -> float | None:
-        """Degree of homogeneity in velocity and delta; None if there is none."""
         vs, vn, delta = _samples()
         before, after = (np.hypot(*self.density(t * vs, t * vn, t * delta)) for t in (1.0, 2.0))
         degrees = np.log2(after / before)
@@ -165,25 +162,21 @@ class OwnLaw:
 
     @cached_property
     def reversible(self) -> bool:
-        """Whether reversing the velocity reverses the force."""
         vs, vn, delta = _samples()
         forward, backward = self.density(vs, vn, delta), self.density(-vs, -vn, delta)
         return all(_same(-b, f) for f, b in zip(forward, backward, strict=True))
 
     @cached_property
     def regularised(self) -> bool:
-        """Whether it depends on delta."""
         return any(name in each.names for each in self._read for name in ("speed", "delta"))
 
     @cached_property
     def smallest(self) -> float:
-        """Smallest dissipation at unit speed."""
         fs, fn = self.density(*_CIRCLE, _DRY)
         return float(-(fs * _CIRCLE[0] + fn * _CIRCLE[1]).max())
 
     @cached_property
     def largest(self) -> float:
-        """Largest force at unit speed."""
         return float(np.hypot(*self.density(*_CIRCLE, _DRY)).max())
 
     def in_units_of(self, unit: float) -> OwnLaw:

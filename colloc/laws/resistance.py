@@ -98,17 +98,14 @@ class PowerLaw(Coefficients):
 
     @property
     def degree(self) -> float:
-        """Degree of homogeneity in velocity and delta."""
         return float(self.power)
 
     @property
     def regularised(self) -> bool:
-        """Whether it depends on delta."""
         return self.power != 1
 
     @property
     def label(self) -> str:
-        """A short name with its numbers."""
         return f"friction ({self.mu_t:g}, {self.mu_f:g}, {self.mu_b:g}) x speed^{self.power:g}"
 
     def describe(self) -> str:
@@ -179,17 +176,14 @@ class Viscous:
 
     @property
     def smallest(self) -> float:
-        """Smallest dissipation at unit speed."""
         return min(self.normal, self.tangential)
 
     @property
     def largest(self) -> float:
-        """Largest force at unit speed."""
         return max(self.normal, self.tangential)
 
     @property
     def label(self) -> str:
-        """A short name with its numbers."""
         return f"drag ({self.normal:g}, {self.tangential:g})"
 
     def describe(self) -> str:

@@ -43,30 +43,18 @@ class Scheme:
 
     @property
     def right(self) -> bool:
-        """The last node is the right end of the interval."""
         return bool(self.c[-1] == 1.0)
 
-    def lagrange(self, tau: np.ndarray) -> np.ndarray:
-        """Lagrange polynomials at tau ``(k,)``, as ``(k, s)``."""
-        tau = np.asarray(tau, dtype=float)
-        values = np.ones((tau.size, self.s))
-        for j in range(self.s):
-            for m in range(self.s):
-                if m != j:
-                    values[:, j] *= (tau - self.c[m]) / (self.c[j] - self.c[m])
-        return values
-
-    def with_begin(self, tau: np.ndarray) -> np.ndarray:
-        """Weights ``(k, s + 1)`` of the state at the begin and at the nodes in the collocation
-        polynomial at tau ``(k,)``."""
-        nodes = np.concatenate([[0.0], self.c])
+    def lagrange(self, tau: np.ndarray, *, begin: bool = False) -> np.ndarray:
+        """Lagrange polynomials at tau ``(k,)``, as ``(k, s)``; with the `begin`, the weights ``(k,
+        s + 1)`` of the state there and at the nodes in the collocation polynomial."""
+        nodes = np.append(0.0, self.c) if begin else self.c
         others = np.where(np.eye(nodes.size, dtype=bool), np.nan, nodes)
         factors = (np.asarray(tau)[:, None, None] - others) / (nodes[:, None] - others)
         return np.asarray(np.nanprod(factors, axis=2))
 
     def integrals(self, tau: np.ndarray) -> np.ndarray:
         """Integrals of the Lagrange polynomials from 0 to tau ``(k,)``, as ``(k, s)``."""
-        tau = np.asarray(tau, dtype=float)
         nodes, weights = _gauss_rule(self.s)
         points = 0.5 * tau[:, None] * (nodes + 1.0)
         values = self.lagrange(points.ravel()).reshape(tau.size, self.s, self.s)

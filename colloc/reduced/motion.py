@@ -234,7 +234,7 @@ class ReducedMotion:
             angles, rates = self._space.at_times(s.v, t)
             k, tau = self._places(t)
             nodes = [s.along.edges[:, :-1, None], momenta[:, mesh.points]]
-            weights = mesh.scheme.with_begin(tau)
+            weights = mesh.scheme.lagrange(tau, begin=True)
             momenta = np.einsum("nj,anj->an", weights, np.concatenate(nodes, axis=2)[:, k])
         accelerations = self._space.accelerations(s.v, mesh.times if t is None else t)
         froude = np.full((1, angles.shape[1]), kind.froude_at(s.shapes, s.passed.static))

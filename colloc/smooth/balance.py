@@ -24,7 +24,7 @@ from colloc.mechanics.balance import pull_back
 from colloc.mechanics.damped_newton import State, groups, relative_delta, solve
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
-from colloc.numerics.schemes import Scheme, scheme
+from colloc.numerics.schemes import scheme
 from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError, ProblemError
 
@@ -57,8 +57,7 @@ class Motion:
 @lru_cache(maxsize=1024)
 def _panel_matrices(n: int, order: int) -> tuple[sparse.csc_matrix, ...]:
     """Nodes to panels, panels to nodes, and integrals from a panel's left end to its nodes."""
-    unit = scheme(f"gauss-{order}")
-    each = sparse.identity(n, format="csc")
+    unit, each = scheme(f"gauss-{order}"), sparse.identity(n, format="csc")
     return tuple(sparse.kron(each, part, "csc") for part in (unit.b, np.ones((order, 1)), unit.A))
 
 
@@ -77,37 +76,35 @@ class PanelGrid:
         return len(self.edges) - 1
 
     @property
-    def gauss(self) -> Scheme:
-        return scheme(f"gauss-{self.order}")
-
-    @property
     def widths(self) -> np.ndarray:
         """Width of the panel of each node."""
         return np.repeat(np.diff(self.edges, axis=0), self.order, axis=0)
 
+    def _on_panels(self, unit: np.ndarray) -> np.ndarray:
+        return np.tile(unit, self.n)[:, None] * self.widths
+
     @property
     def nodes(self) -> np.ndarray:
         left = np.repeat(self.edges[:-1], self.order, axis=0)
-        return left + np.tile(self.gauss.c, self.n)[:, None] * self.widths
+        return left + self._on_panels(scheme(f"gauss-{self.order}").c)
 
     @property
     def weights(self) -> np.ndarray:
-        return np.tile(self.gauss.b, self.n)[:, None] * self.widths
+        return self._on_panels(scheme(f"gauss-{self.order}").b)
+
+    def to_edges(self, integrand: Array, reference: int) -> Array:
+        """Integrals from edge `reference` to every edge, of an integrand times the widths."""
+        edge, panel = np.arange(self.n + 1)[:, None], np.arange(self.n)
+        path = np.where(panel >= reference, 1.0 * (panel < edge), -1.0 * (panel >= edge))
+        matmul = namespace(integrand).matmul
+        return matmul(path, matmul(_panel_matrices(self.n, self.order)[0], integrand))
 
     def integrate(self, integrand: Array, reference: int) -> Array:
-        """Integrals from edge `reference` to the nodes, of an integrand times the widths."""
+        """The same up to the nodes."""
         matmul = namespace(integrand).matmul
-        whole, spread, inside = _panel_matrices(self.n, self.order)
-        ahead, ones = np.arange(self.n) >= reference, np.ones((self.n, self.n))
-        panel_by_panel = np.tril(ones, -1) * ahead - np.triu(ones) * ~ahead
-        start = matmul(panel_by_panel, matmul(whole, integrand))
+        _, spread, inside = _panel_matrices(self.n, self.order)
+        start = self.to_edges(integrand, reference)[: self.n, :]
         return matmul(spread, start) + matmul(inside, integrand)
-
-    def edge_path(self, reference: int) -> np.ndarray:
-        """The same integrals up to the edges, ``(n_panel + 1, n_node)``."""
-        edge, panel = np.arange(self.n + 1)[:, None], np.arange(self.n)[None, :]
-        ahead = (panel >= reference).astype(float) * (panel < edge)
-        return np.kron(ahead - (panel < reference) * (panel >= edge), self.gauss.b)
 
 
 class Curve(NamedTuple):
@@ -131,9 +128,9 @@ def curve(
     number `reference`, where Theta has the rate ``(1, n_time)`` (paper, eqs. x0, y0 and dtz0)."""
     xp, width = namespace(angle, rate), panels.widths
     c, s = xp.cos(angle), xp.sin(angle)
-    x, y = panels.integrate(width * c, reference), panels.integrate(width * s, reference)
     turning = width * (rate - reference_rate)
-    vx, vy = -panels.integrate(turning * s, reference), panels.integrate(turning * c, reference)
+    integrands = width * c, width * s, -turning * s, turning * c
+    x, y, vx, vy = (panels.integrate(each, reference) for each in integrands)
     return Curve(
         c, s, x * s - y * c, x * c + y * s, vx * c + vy * s, vy * c - vx * s, panels.weights
     )
@@ -181,8 +178,7 @@ class PanelBatch:
         self.panels = panels if fixed else PanelGrid(panels.edges[:, members], panels.order)
         self.angle, self.rate, self.edge_rate = (row[:, members] for row in rows)
         self.friction, self.reference = friction, reference
-        anchor_rate = self.edge_rate[reference : reference + 1]
-        now = curve(self.panels, self.angle, self.rate, reference, anchor_rate)
+        now = curve(self.panels, self.angle, self.rate, reference, self.edge_rate[[reference]])
         self.curve = now._replace(weight=np.broadcast_to(now.weight, self.angle.shape))
 
     def evaluate(
@@ -209,23 +205,16 @@ class PanelBatch:
 
     def edge_velocity(self, z: np.ndarray) -> np.ndarray:
         """Velocity and rotation rate of every edge, ``(3, n_edge, n)``, in the axes of Theta."""
-        path, anchor_rate = self.panels.edge_path(self.reference), self.edge_rate[self.reference]
-        turning = self.panels.widths * (self.rate - anchor_rate + z[2])
-        return np.stack(
-            [
-                z[0] - path @ (turning * np.sin(self.angle)),
-                z[1] + path @ (turning * np.cos(self.angle)),
-                z[2] + self.edge_rate - anchor_rate,
-            ]
-        )
-
-    def node_speed(self, z: np.ndarray) -> np.ndarray:
-        return np.hypot(*node_velocity(self.curve, z))
+        turned = self.edge_rate - self.edge_rate[self.reference]
+        turning = self.panels.widths * (self.rate - self.edge_rate[self.reference] + z[2])
+        parts = -turning * np.sin(self.angle), turning * np.cos(self.angle)
+        ways = (self.panels.to_edges(part, self.reference) for part in parts)
+        return np.stack([*ways, turned]) + z[:, None]
 
     def panel_speed(self, z: np.ndarray) -> np.ndarray:
         """Largest speed of a node in each panel; infinite for panels of width zero."""
-        speed = self.node_speed(z).reshape(self.panels.n, -1, z.shape[1]).max(axis=1)
-        return np.where(np.diff(self.panels.edges, axis=0) > 0, speed, np.inf)
+        speed = np.hypot(*node_velocity(self.curve, z)).reshape(self.panels.n, -1, z.shape[1])
+        return np.where(np.diff(self.panels.edges, axis=0) > 0, speed.max(axis=1), np.inf)
 
     def panel_sums(self, z: np.ndarray, delta: np.ndarray | float) -> np.ndarray:
         """Force, torque about the reference and power of every panel, ``(4, n_panel, n)``."""
@@ -252,17 +241,16 @@ class SmoothSolution:
     """A smooth body in balance; arrays of length n_time unless stated."""
 
     t: np.ndarray  # phases
+    tolerance: float
     z: np.ndarray  # tail velocities (3, n_time)
-    power: np.ndarray  # dissipated by friction
     centre: np.ndarray  # velocity of the centre of mass (2, n_time)
     force: np.ndarray  # net force and torque about the tail, or the part at rest, (3, n_time)
+    power: np.ndarray  # dissipated by friction
     bending_power: np.ndarray  # of what bends the body; equals `power` in balance
     power_inside: np.ndarray  # `power` on the arcs `regions`
     slowest: np.ndarray  # smallest speed of a whole panel
     residual: np.ndarray  # as of `BalanceSolution`
-    quadrature_error: np.ndarray  # of the worst panel, from its halves, in force or power
     iterations: np.ndarray
-    tolerance: float
 
     def require(self) -> SmoothSolution:
         """This solution, or a `NotConvergedError` naming the time points that failed."""
@@ -295,17 +283,17 @@ def solve_smooth(
 ) -> SmoothSolution:
     """Velocities that put a smooth body in force and torque balance at phases t ``(n_time,)``.
 
-    The first panels end at the motion's breaks; a `quadrature_tolerance` of 0 keeps them, and a
-    `grid` is the same at all times. `regions` are arcs whose power is reported separately. Tail
-    velocities ``(3, n_time)``: `start` to start from; `slide` to slide with, instead of those that
-    balance. Others as of `solve_balance`.
+    The first panels end at the motion's breaks; a `grid` is the same at all times. `regions` are
+    arcs whose power is reported separately. Tail velocities ``(3, n_time)``: `start` to start from;
+    `slide` to slide with, instead of those that balance. Others as of `solve_balance`.
     """
     check_finite(positive=True, delta=delta)
     t = np.atleast_1d(np.asarray(t, dtype=float))
-    n = t.size
-    z, centre, force = np.zeros((3, n)), np.zeros((2, n)), np.zeros((3, n))
-    power, bending, inside, slowest, residual, error = np.zeros((6, n))
-    steps, active = np.zeros(n, dtype=int), np.arange(n)
+    n, active = t.size, np.arange(t.size)
+    vectors, numbers = np.zeros((3, 3, n)), np.zeros((5, n))
+    steps, (z, force, centre), (power, bending, inside, slowest, residual) = (
+        np.zeros(n, dtype=int), vectors, numbers,
+    )  # fmt: skip
     if grid is not None:
         edges = grid.edges
     else:
@@ -342,33 +330,28 @@ def solve_smooth(
             batch, moved = batch_of(members, reference), state.velocity[:, members]
             at, dry, fast = active[members], d[:, members], speed[members]
             spent = fast ** (1.0 + (friction.degree or 0.0))
-            sums = batch.panel_sums(moved, dry)
+            sums, slides = batch.panel_sums(moved, dry), node_velocity(batch.curve, moved)
             tail = batch.edge_velocity(moved)[:, TAIL]
             tail[2] -= batch.edge_rate[TAIL]
-            z[:, at] = tail * fast
-            centre[:, at] = resultant(batch.curve, *node_velocity(batch.curve, moved))[:2] * fast
+            z[:, at], centre[:, at] = tail * fast, resultant(batch.curve, *slides) * fast
             force[:, at], power[at] = sums[:3].sum(axis=1) * spent / fast, sums[3].sum(0) * spent
             places = middle if grid is not None else middle[:, members]
-            is_inside = np.zeros(places.shape, dtype=bool)
-            for low, high in regions:
-                is_inside |= (places > low) & (places < high)
-            inside[at] = (sums[3] * is_inside).sum(axis=0) * spent
+            held = (sums[3] * ((places > low) & (places < high)) for low, high in regions)
+            inside[at] = sum(part.sum(axis=0) * spent for part in held)
             bending[at] = batch.bending_power(moved, dry) * spent
             least = batch.panel_speed(moved).min(axis=0)
             slowest[at] = least * fast
-            if grid is not None:
-                continue
-            missed = _panel_error(motion, t[at], batch, moved, dry, fast)
-            error[at] = missed.max(axis=0)
-            # two stretches at rest know each other's velocity to rounding only: no refinement
-            # beats that
-            floor = _ROUNDING * batch.node_speed(moved).max(axis=0) / (dry[0] + least)
-            split[:, members] = missed > quadrature_tolerance + floor
+            if grid is None:
+                missed = _panel_error(motion, t[at], batch, moved, dry, fast)
+                # two stretches at rest know each other's velocity to rounding only: no refinement
+                # beats that
+                floor = _ROUNDING * np.hypot(*slides).max(axis=0) / (dry[0] + least)
+                split[:, members] = missed > quadrature_tolerance + floor
         steps[active] += state.iterations
         residual[active] = state.residual
         used = np.sum(np.diff(edges, axis=0) > 0, axis=0)
         more = split.any(axis=0) & (used < _MOST_PANELS) & (state.residual <= tolerance)
-        if grid is not None or quadrature_tolerance == 0 or level == _REFINEMENTS or not more.any():
+        if level == _REFINEMENTS or not more.any():
             break
         anchor_at = np.take_along_axis(edges, state.anchor[None], 0)[:, more]
         active, velocity = active[more], velocity[:, more]
@@ -378,7 +361,7 @@ def solve_smooth(
         edges = edges[: 1 + int(np.max(np.sum(edges < 1.0, axis=0)))]
         anchor = np.argmax(edges == anchor_at, axis=0)
     return SmoothSolution(
-        t, z, power, centre, force, bending, inside, slowest, residual, error, steps, tolerance
+        t, tolerance, z, centre[:2], force, power, bending, inside, slowest, residual, steps
     )
 
 

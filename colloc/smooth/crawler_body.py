@@ -23,7 +23,7 @@ from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.balance import PanelGrid
 from colloc.smooth.prescribed_body import ODD_SCALE
 from colloc.smooth.smooth_body import SmoothBody
-from colloc.system.arguments import check_finite, is_number, is_whole, named_arguments
+from colloc.system.arguments import check_count, check_finite, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 LAP = 1.3
@@ -76,8 +76,7 @@ class CrawlerBody(SmoothBody):
                 raise ProblemError(
                     f"{name} must lie between {low} and {high}, not {getattr(self, name)!r}."
                 )
-        if not is_whole(self.modes, 2, 12):
-            raise ProblemError(f"modes must lie between 2 and 12, not {self.modes!r}.")
+        check_count(12, least=2, modes=self.modes)
 
     @property
     def width(self) -> float:

@@ -14,7 +14,7 @@ from colloc.mechanics.bodies import BoundedAngles, Stretch
 from colloc.numerics.arrays import Array, namespace
 from colloc.smooth.balance import PanelGrid
 from colloc.smooth.smooth_body import SmoothBody
-from colloc.system.arguments import is_whole, named_arguments
+from colloc.system.arguments import check_count, named_arguments
 from colloc.system.errors import ProblemError
 
 LEGENDRE, FOURIER = "legendre", "fourier"
@@ -58,12 +58,9 @@ class ModalBody(SmoothBody):
     def __post_init__(self) -> None:
         if self.basis not in (LEGENDRE, FOURIER):
             raise ProblemError(f"basis must be {LEGENDRE!r} or {FOURIER!r}, not {self.basis!r}.")
-        for name, least, most in (("modes", 1, 20), ("panels", 1, 200), ("order", 2, 12)):
-            value = getattr(self, name)
-            if not is_whole(value, least, most):
-                raise ProblemError(
-                    f"{name} must be a whole number from {least} to {most}, not {value!r}."
-                )
+        check_count(20, modes=self.modes)
+        check_count(200, panels=self.panels)
+        check_count(12, least=2, order=self.order)
         if self.basis == FOURIER and self.modes % 2:
             raise ProblemError(
                 f"fourier modes come in pairs (sine and cosine); {self.modes} is odd."

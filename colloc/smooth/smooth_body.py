@@ -131,8 +131,8 @@ class SmoothBody(Body):
         return curve(_OUTLINE, self.tangent(_OUTLINE.nodes, angles), zero, TAIL, zero)
 
     def outline(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        path, now = _OUTLINE.edge_path(TAIL) * _OUTLINE.widths[:, 0], self._curve(angles)
-        return path @ now.cos, path @ now.sin
+        now, width = self._curve(angles), _OUTLINE.widths
+        return _OUTLINE.to_edges(width * now.cos, TAIL), _OUTLINE.to_edges(width * now.sin, TAIL)
 
     def centre(self, angles: np.ndarray) -> np.ndarray:
         now = self._curve(angles)

@@ -203,11 +203,11 @@ def check_finite(positive: bool = False, **numbers: object) -> None:
             )
 
 
-def check_count(most: float = math.inf, **numbers: object) -> None:
-    """Raise a `ProblemError` for the first value that is no whole number in [1, most]."""
+def check_count(most: float = math.inf, least: int = 1, **numbers: object) -> None:
+    """Raise a `ProblemError` for the first value that is no whole number in [least, most]."""
     for name, value in numbers.items():
-        if not is_whole(value, 1, most):
-            ends = "of at least 1" if most == math.inf else f"from 1 to {most}"
+        if not is_whole(value, least, most):
+            ends = f"of at least {least}" if most == math.inf else f"from {least} to {most}"
             raise ProblemError(f"{name} must be a whole number {ends}, not {shown(value)}.")
 
 

@@ -16,7 +16,7 @@ from colloc.dynamics.follow import integrate_period
 from colloc.gaits import gait_fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
-from colloc.mechanics.densities import LENGTH, Instants
+from colloc.mechanics.densities import LENGTH
 from colloc.mechanics.fixed_point import chain_motion, motion_and_derivatives, solve_balance
 from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
@@ -43,12 +43,6 @@ class PushedMotion(QuasiStatic):
 
         now = now._replace(power=now.actuator_power)
         return Trajectory(static, now, solved.residual < 1e-9, slopes)
-
-    def instants(self, shapes, theta, z=None):
-        at = self.law, shapes.angles, shapes.rates, shapes.delta
-        pushed = self.regime.pull(np.zeros((1, theta.size)))
-        z = solve_balance(self.body, *at, load=pushed).z if z is None else z
-        return Instants(self.body, *at, z=z, unit=shapes.unit, load=pushed)
 
 
 @dataclass(frozen=True)
