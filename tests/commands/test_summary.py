@@ -1,12 +1,24 @@
 """What a solve ends with: a few lines that a person reads, and numbers that mean the same as
 everywhere else."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Friction, Harmonic, PathLimit, Problem, ellipse, evaluate, replay
+from colloc import (
+    Chain,
+    Fourier,
+    Friction,
+    Harmonic,
+    PathLimit,
+    Problem,
+    Robot,
+    ellipse,
+    evaluate,
+    replay,
+)
 from colloc.commands.solve import summary_dict, summary_lines
 from colloc.results import limit_use
 from colloc.results.checks import Check
@@ -71,6 +83,17 @@ def test_limits_that_no_gait_could_reach_are_named_with_what_it_could_need():
         "its unit",
         "power_limit 2 cannot matter: no gait needs more than 0.698 weight x body length per "
         "period, its unit",
+    ]
+
+
+def test_limits_of_a_robot_are_told_in_its_units():
+    """A third of 3 kg and 1.2 m, as above, and 4 pi in 600 s."""
+    robot = Robot(length=1.2, mass=3, period=600, max_speed=1, max_torque=50)
+    _, lines = told_of_limits(joint_limit=2.0, robot=robot)
+    assert re.search(r"joint speed [.\d]+ % of 1 rad/s, torque [.\d]+ % of 50 N m$", lines[0])
+    assert lines[1:] == [
+        f"max_speed 1 cannot matter: no gait needs more than {np.pi / 150:.3g} rad/s, its unit",
+        f"max_torque 50 cannot matter: no gait needs more than {1.2 * 3 * 9.81 / 18:.3g} N m, its unit",
     ]
 
 

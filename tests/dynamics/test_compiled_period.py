@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Foot, Friction, Problem
+from colloc import Chain, Foot, Friction, Problem, Wheel
 from colloc.dynamics.compiled_period import CompiledPeriod
 from colloc.dynamics.dynamics import Shapes
 from colloc.mechanics.native_kernel import native_kernel
@@ -15,12 +15,14 @@ from tests.shared.without_kernel import numpy_instead
 pytestmark = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 ROUGH = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 FEET = tuple(Foot(k) for k in range(3))
+ASKEW = [Wheel(0, 0.3, axle=True, angle=0.4 * s, offset=0.05 * s) for s in (1, -1)]
 CASES = """
 three links: gait=Harmonic(2)
 different friction each way: gait=Harmonic(2), friction=ROUGH
 an elliptic law: gait=Harmonic(2), friction=Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.5)
 seven links of many lengths: body=Chain((0.1, 0.2, 0.15, 0.1, 0.2, 0.1, 0.15)), friction=ROUGH
 links on feet: body=Chain(feet=FEET), gait=Harmonic(2)
+wheels on axles, two of them askew: body=Chain(feet=(*ASKEW, Foot(1), Wheel(2, axle=True, rolling=0.3)))
 a wheel between two pads: body=Chain((0.3, 0.4, 0.3), feet=(Pad(0, 0.1, 0.6), Wheel(1), Pad(2)))
 half a period, and points that neighbours share: gait=Harmonic(1, "antipodal"), scheme="hermite-simpson"
 delta relative to the speed: gait=Polygon(4), friction=ROUGH

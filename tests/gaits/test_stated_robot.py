@@ -9,7 +9,9 @@ from PIL import Image
 
 import colloc
 from colloc import Chain, Free, Harmonic, Problem, ProblemError, Robot
+from colloc.results.comparison import compare
 from colloc.results.robot import in_si
+from colloc.studies.families import ParetoFront
 
 SNAKE = Robot(length=0.62, mass=0.9, period=2.5, max_speed=5, max_torque=(1.2, 1.0), idle_power=2)
 SLOW = Robot(length=0.62, mass=0.9, period=600, idle_power=0.01, max_speed=0.05)
@@ -107,21 +109,42 @@ def slow_robot():
     return colloc.solve(problem, starts=2)
 
 
-def test_speed_and_energy_are_those_of_the_period_in_metres_and_joules(slow_robot):
+def whoever_speaks_of_it_says_the_same(found, tmp_path):
+    """How fast a robot is and what it draws: its sheet has the torques of all instants, and an
+    export is of the same robot."""
+    facts, sheet, robot = in_si(found), found.robot().facts, found.problem.robot
+    for name, same in (
+        ("speed_m_per_s", "speed_m_per_s"),
+        ("friction_work_per_cycle_J", "work_per_period_J"),
+        ("motor_work_per_cycle_J", "motor_work_per_period_J"),
+        ("period_s", "period_s"),
+    ):
+        assert facts[name] == pytest.approx(sheet[same], rel=2e-3), name
+    drawn = facts["motor_work_per_cycle_J"] + robot.idle_power * facts["period_s"]
+    assert facts["energy_J_per_m"] == pytest.approx(drawn / facts["distance_per_cycle_m"])
+    way = "distance / period" if isinstance(robot.period, tuple) else "distance"
+    aims = colloc.Objective(way, name="speed" * ("/" in way)), found.problem.objective
+    numbers = 100 * facts["speed_m_per_s"], facts["energy_J_per_m"]
+    front = ParetoFront(found.problem, aims, (found,))
+    np.testing.assert_allclose(front.in_units[1], [numbers], rtol=1e-6)
+    rows = dict(row[:2] for row in compare(found, found)[0])
+    assert [rows["speed [cm/s]"], rows["energy [J/m]"]] == [f"{x:.4g}" for x in numbers]
+    written = found.export(tmp_path / "x.csv", ramp=False)
+    assert (written["length_m"], written["mass_kg"]) == (robot.length, robot.mass)
+    assert written["period_s"] == pytest.approx(facts["period_s"], abs=0.02)
+
+
+def test_speed_and_energy_are_those_of_the_period_in_metres_and_joules(slow_robot, tmp_path):
     assert slow_robot.success
+    whoever_speaks_of_it_says_the_same(slow_robot, tmp_path)
     facts, unit = in_si(slow_robot), 0.9 * 9.81 * 0.62
     assert facts["speed_m_per_s"] == pytest.approx(slow_robot.distance * 0.62 / 600)
-    motors = unit * slow_robot.certificate.values["driven_work"]
-    assert facts["energy_J_per_m"] == pytest.approx(
-        (motors + 0.01 * 600) / (slow_robot.distance * 0.62)
-    )
     power = facts["energy_J_per_m"] * facts["speed_m_per_s"]
     assert facts["mean_battery_power_W"] == pytest.approx(power)
     # the best value is the inverse of this cost, in weights
     assert slow_robot.value == pytest.approx(0.9 * 9.81 / facts["energy_J_per_m"], rel=1e-9)
-    sheet = slow_robot.robot()
-    assert sheet.facts["period_s"] == 600
-    assert sheet.facts["speed_m_per_s"] == pytest.approx(facts["speed_m_per_s"], rel=1e-3)
+    motors = unit * slow_robot.certificate.values["driven_work"]
+    assert facts["motor_work_per_cycle_J"] == pytest.approx(motors)
 
 
 @pytest.mark.parametrize(("over_swing", "failures"), [(0.99, []), (1.01, ["backlash"])])
@@ -146,7 +169,8 @@ def test_a_figure_of_a_robot_has_its_units(slow_robot):
             assert number == pytest.approx(unit * place, abs=1e-6 * unit)
 
 
-def test_a_period_that_is_sought_keeps_the_speed_of_the_motors():
+@pytest.mark.slow
+def test_a_period_that_is_sought_keeps_the_speed_of_the_motors(tmp_path):
     robot = Robot(length=0.62, mass=0.9, period=(1, 20), max_speed=2.0, idle_power=2)
     problem = Problem("sought", gait=Harmonic(1, "antipodal"), robot=robot, delta=1e-2)
     solution = colloc.solve(problem, starts=2)
@@ -156,6 +180,7 @@ def test_a_period_that_is_sought_keeps_the_speed_of_the_motors():
     t = np.linspace(0, 1, 4001)
     fastest = np.abs(solution.gait.rates(t)).max() / period
     assert fastest == pytest.approx(2.0, rel=1e-4)  # idle power hurries
+    whoever_speaks_of_it_says_the_same(solution, tmp_path)
     # at that period, stated, the gait is as good
     stated = problem.with_(robot=replace(robot, period=period))
     again = colloc.solve(stated.with_(guess=replace(solution.gait, log_period=None)), starts=1)

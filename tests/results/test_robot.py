@@ -3,6 +3,7 @@ the pace of a gait alone, slopes, and what an arc is."""
 
 import json
 import math
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,7 +15,7 @@ from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate,
 from colloc.commands.main import main
 from colloc.pictures.report_page import report_page
 from colloc.results.motion import Arc, arc
-from colloc.results.robot import RobotSheet
+from colloc.results.robot import RobotSheet, in_si
 from colloc.verification.trajectory import plan_trajectory
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
@@ -299,6 +300,9 @@ def test_on_a_slope_less_than_the_weight_presses_and_all_of_it_is_transported(to
     assert facts["work_per_period_J"] == pytest.approx(work, rel=1e-4)
     assert facts["cost_of_transport"] == pytest.approx(work / (MASS * 9.81 * way), rel=1e-4)
     assert facts["froude_number"] == pytest.approx(LENGTH / (presses * 2000.0**2))
+    robot = colloc.Robot(length=LENGTH, mass=MASS, period=2000.0)
+    stated = in_si(replace(towards_left, problem=towards_left.problem.with_(robot=robot)))
+    assert stated["friction_work_per_cycle_J"] == pytest.approx(work)
 
 
 def test_an_export_on_a_slope_is_of_the_shorter_robot_that_has_that_pace_there(unsolved, tmp_path):

@@ -141,9 +141,11 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(
 
     def sketch(problem, gait, is_new, deltas, known):
         if not known[-1]:
-            found = SimpleNamespace(objective=-1.0, gait=GAIT, delta=1.0, v=None)
-            found.problem, found.space = problem, SimpleNamespace(objective=lambda v: -1.0)
-            known[-1].append(explore.Candidate(found))
+            # the other one is better where friction is not yet dry, and nobody meets it again
+            for value, dry in ((-1.0, -1.0), (-2.0, -0.5)):
+                found = SimpleNamespace(objective=value, gait=GAIT, delta=1.0, v=None)
+                found.problem, found.space = problem, SimpleNamespace(objective=lambda v, x=dry: x)
+                known[-1].append(explore.Candidate(found))
         if next(numbers) in meeting:
             known[-1][0].n_new += is_new
 
@@ -151,7 +153,9 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "ReducedProgram", lambda space, delta: space)
     problem = Problem("same", gait=Harmonic(1, "antipodal"), froude=froude)
-    assert multistart(problem, asked)[1] == tried
+    candidates, count = multistart(problem, asked)
+    assert count == tried
+    assert [each.iterate.objective for each in candidates] == [-1.0, -2.0]
 
 
 @pytest.mark.parametrize(

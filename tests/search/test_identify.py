@@ -67,9 +67,30 @@ def test_any_point_of_the_body_and_its_direction_will_do_in_metres_too(crawled, 
     assert found.after < 1e-4 < found.before
     again = colloc.identify(FLOOR.with_(robot=Robot(length=0.6, mass=1, period=90)), path)
     assert again.coefficients == found.coefficients
-    (tmp_path / "m.csv").write_text(path.read_text().replace(f"{point}x", f"{point}x_m"))
+    head, *_ = path.read_text().split("\n")
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    rows[:, 3:5] *= 100
+    cm = head.replace(f"{point}x,{point}y", f"{point}x_cm,{point}y_cm")
+    np.savetxt(tmp_path / "cm.csv", rows, "%.9g", ",", header=cm, comments="")
+    measured = colloc.identify(FLOOR, tmp_path / "cm.csv", length=0.6)
+    assert measured.problem.friction.mu_t == pytest.approx(TRUE.mu_t, rel=1e-3)
     with pytest.raises(colloc.ProblemError, match="give the length of the body"):
-        colloc.identify(FLOOR, tmp_path / "m.csv")
+        colloc.identify(FLOOR, tmp_path / "cm.csv")
+
+
+def test_directions_alone_tell_coefficients_too(crawled, tmp_path):
+    path = recorded(tmp_path / "a.csv", crawled, noise=1e-6, point="tail_")
+    names, rows = (
+        path.read_text().split("\n")[0].split(","),
+        np.loadtxt(path, None, "#", ",", None, 1),
+    )
+    some = [k for k, name in enumerate(names) if name[-1] not in "xy"]
+    head = ",".join(names[k] for k in some)
+    np.savetxt(path, rows[:, some], "%.9g", ",", header=head, comments="")
+    found = colloc.identify(FLOOR, path)
+    assert found.problem.friction.mu_t == pytest.approx(TRUE.mu_t, rel=1e-3)
+    assert found.problem.friction.mu_b == pytest.approx(TRUE.mu_b, rel=1e-3)
+    assert "path of headings in body lengths" in found.message
 
 
 def test_markers_at_ends_and_joints_tell_angles_and_path(crawled, tmp_path):

@@ -175,6 +175,22 @@ def test_of_a_quantity_that_is_asked_for_twice_the_larger_value_counts():
     assert [least for _, least in twice.at_least] == [0.2, 0.1]
 
 
+def test_the_command_writes_a_table_that_is_read_as_the_same_front(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "floor.py").write_text(ONE_FLOOR, encoding="utf-8")
+    words = "floor.py --points 2 --starts 1 --no-figure --json"
+    assert main(["pareto", *words.split()]) == 0
+    told, table = json.loads(capsys.readouterr().out), tmp_path / "results/floor.front.csv"
+    points = [load(row["file"]) for row in told["points"]]
+    assert [row["distance"] for row in told["points"]] == [point.distance for point in points]
+    assert points[0].distance > points[-1].distance
+    table.write_text(table.read_text().replace("00.h5,", "00.h5,a hole"))
+    again = read_front(table, points[-1].problem)
+    np.testing.assert_array_equal(again.values, [(p.distance, p.efficiency) for p in points])
+    assert again.gaps == (Gap(0, "a hole", True),)
+    assert read_front(table, points[-1].problem.with_(delta=2e-2)) is None
+
+
 @pytest.mark.slow
 def test_solve_leaves_a_front_that_the_report_shows(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -183,10 +199,6 @@ def test_solve_leaves_a_front_that_the_report_shows(tmp_path, monkeypatch, capsy
     front = json.loads(capsys.readouterr().out)["front"]
     points = [load(row["file"]) for row in front["points"]]
     assert points[-1].value == load("results/floor.h5").value
-    assert [row["distance"] for row in front["points"]] == [point.distance for point in points]
-    table = read_front(tmp_path / "results/floor.front.csv", points[-1].problem)
-    np.testing.assert_array_equal(table.values, [(p.distance, p.efficiency) for p in points])
-    assert [gap.after for gap in table.gaps] == [gap["after"] for gap in front["gaps"]]
     assert main(["report", "results/floor.h5"]) == 0
     page = (tmp_path / "results/floor.html").read_text(encoding="utf-8")
     assert all(f"<td>{point.distance:.5g}</td>" in page for point in points)
