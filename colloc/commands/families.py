@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from colloc.studies.study import Study
     from colloc.studies.sweep import StudyTable
 
-_STARTS = cli.option(int, "--starts", "N", "starts 0 to N-1 (default: 20)", 20, least=1)
+_STARTS = cli.option(int, "--starts N", "starts 0 to N-1 (default: 20)", 20, least=1)
 _TIME_LIMIT = cli.option(
-    float, "--time-limit", "S", "seconds for one start (default: 300)", 300.0, least=0
+    float, "--time-limit S", "seconds for one start (default: 300)", 300.0, least=0
 )
 _MOST_SHOWN = 12
 _SAVE_EVERY = 60.0  # seconds
@@ -94,20 +94,15 @@ start like any other, solved again from its gait (from its guess, if it had fail
   colloc multistart results/three_link.starts.h5 --start 7     results/three_link.start-7.h5""",
     *cli.PROBLEM,
     _STARTS,
-    cli.option(int, "--seed", "N", "of the sampler (default: 0)", 0, least=0),
+    cli.option(int, "--seed N", "of the sampler (default: 0)", 0, least=0),
     cli.WORKERS,
     cli.option(
-        str,
-        "--sampler",
-        None,
-        "perturbed: near the problem's guess",
-        LATIN_HYPERCUBE,
-        choices=SAMPLERS,
+        str, "--sampler", "perturbed: near the problem's guess", LATIN_HYPERCUBE, choices=SAMPLERS
     ),
     _TIME_LIMIT,
     cli.RETRY,
     cli.BOUND,
-    cli.option(int, "--start", "N", "with an archive: the start to make a result of"),
+    cli.option(int, "--start N", "with an archive: the start to make a result of"),
     cli.VERBOSE,
     cli.output("folder, or .h5 file (default: results/NAME.starts.h5; beside an archive)"),
 )
@@ -207,10 +202,10 @@ def _open_archive(options: argparse.Namespace) -> int:
 Starts travel between neighbours. What is done is kept, and not solved again. A study file is Python
 code, and is executed. Exit code 3: some cells have no certified gait.""",
     cli.option(
-        str, "study", None, "a Python file that states STUDY, for example studies/friction_plane.py"
+        str, "study", "a Python file that states STUDY, for example studies/friction_plane.py"
     ),
     cli.WORKERS,
-    cli.option(int, "--chunk", "N", "cells to a task, instead of the study's own number", least=1),
+    cli.option(int, "--chunk N", "cells to a task, instead of the study's own number", least=1),
     cli.RETRY,
     cli.output("folder, or .nc file; NAME.study/ lies beside it (default: results/NAME.nc)"),
 )
@@ -318,13 +313,13 @@ colloc solve --front begins at the answer.
     cli.option(
         str,
         "--objectives",
-        ("FIRST", "SECOND"),
         "default: distance, and what the problem maximises",
+        (None, None),
         nargs=2,
-        default=(None, None),
+        metavar=("FIRST", "SECOND"),
     ),
-    cli.option(int, "--points", "N", "about so many, without duplicates (default: 5)", 5, least=2),
-    cli.option(int, "--starts", "N", "starting points for both ends (default: as solve)", least=1),
+    cli.option(int, "--points N", "about so many, without duplicates (default: 5)", 5, least=2),
+    cli.option(int, "--starts N", "starting points for both ends (default: as solve)", least=1),
     cli.output("folder, or .csv file (default: results/NAME.front.csv)"),
     cli.NO_FIGURE,
 )
@@ -345,11 +340,10 @@ of a period.
   colloc steer mine.py --turn -40 -20 -10 0 10 20 40 --spot -30 30""",
     *cli.PROBLEM,
     cli.option(float,
-        "--turn", "DEG", "per period (default: -30 -15 0 15 30)", [-30.0, -15.0, 0.0, 15.0, 30.0],
-        nargs="+",
-    ),
-    cli.option(float, "--spot", "DEG", "turns on the spot, with the least work", [], nargs="+"),
-    cli.option(int, "--starts", "N", "starts for the straight gait (default: 32)", least=1),
+        "--turn DEG", "per period (default: -30 -15 0 15 30)", [-30.0, -15.0, 0.0, 15.0, 30.0],
+        nargs="+"),
+    cli.option(float, "--spot DEG", "turns on the spot, with the least work", [], nargs="+"),
+    cli.option(int, "--starts N", "starts for the straight gait (default: 32)", least=1),
     cli.output("folder, or .json file (default: results/NAME.steer.json)"),
     cli.NO_FIGURE,
 )  # fmt: skip

@@ -158,14 +158,16 @@ def command(epilog: str, *options: Option) -> Callable[[Function], Callable[...,
 
 def option(
     kind: Callable[[str], Any],
-    name: str,
-    metavar: Any,
+    signature: str,
     help: str,
     default: Any = None,
     least: float | None = None,
     **more: Any,
 ) -> Option:
-    """An option with a value: a whole number of at least `least`, or a number above it."""
+    """An option with a value, its name and what stands for the value in a signature: a whole number
+    of at least `least`, or a number above it."""
+    name, _, metavar = signature.partition(" ")
+    more = {"metavar": metavar or None} | more
     whole = kind is int
 
     def read(text: str) -> Any:
@@ -179,11 +181,11 @@ def option(
         what = f"at least {least}, and at most {_MOST}" if whole else "positive"
         raise argparse.ArgumentTypeError(f"must be {what}, not {value}")
 
-    return name, {"metavar": metavar, "help": help, "type": read, "default": default, **more}
+    return name, {"help": help, "type": read, "default": default, **more}
 
 
 def output(what: str) -> Option:
-    return option(str, "--output", "PATH", what)
+    return option(str, "--output PATH", what)
 
 
 def flag(name: str, help: str) -> Option:
@@ -197,37 +199,30 @@ PRINTING = (
 VERBOSE = flag("--verbose", "also print the search, the gait and every check")
 NO_FIGURE = flag("--no-figure", "do not draw a figure")
 BOUND = flag("--bound", "compute an upper bound on every gait (a minute; kept in bounds.sqlite)")
-WORKERS = option(int, "--workers", "N", "processes, one BLAS thread each (default: 1)", 1, least=1)
+WORKERS = option(int, "--workers N", "processes, one BLAS thread each (default: 1)", 1, least=1)
 RETRY = flag("--retry", "solve again what ended in an error, a crash or the time limit")
-RESULT = option(str, "result", "FILE.h5", "a result that colloc solve wrote")
+RESULT = option(str, "result FILE.h5", "a result that colloc solve wrote")
 CHANGES = (
-    option(float, "--delta", "SPEED", "final regularisation speed of friction"),
-    option(float, "--delta-start", "SPEED", "first delta of the continuation"),
-    option(int, "--mesh", "N", "intervals of the first mesh", dest="intervals"),
-    option(float, "--mesh-tolerance", "TOL", "relative error to refine to; 0: never"),
-    option(str, "--scheme", "NAME", "trapezoid, hermite-simpson, gauss-N or radau-N"),
-    option(
-        str, "--formulation", "NAME", "of the balance as constraints: full, or implicit velocity"
-    ),
+    option(float, "--delta SPEED", "final regularisation speed of friction"),
+    option(float, "--delta-start SPEED", "first delta of the continuation"),
+    option(int, "--mesh N", "intervals of the first mesh", dest="intervals"),
+    option(float, "--mesh-tolerance TOL", "relative error to refine to; 0: never"),
+    option(str, "--scheme NAME", "trapezoid, hermite-simpson, gauss-N or radau-N"),
+    option(str, "--formulation NAME", "of the balance as constraints: full, or implicit velocity"),
 )
 PROBLEM = (
-    option(
-        str,
-        "problem",
-        None,
-        "a Python file that states PROBLEM, for example problems/three_link.py",
-    ),
+    option(str, "problem", "a Python file that states PROBLEM, for example problems/three_link.py"),
     *CHANGES,
 )
 """The problem file, and the changes to it that every solving command takes."""
 ROBOT = (
-    option(float, "--length", "M", "of the stretched robot [m] (default: the problem's)"),
-    option(float, "--mass", "KG", "of the robot [kg] (default: the problem's)"),
-    option(float, "--gravity", "G", "default: the problem's, or 9.81 m/s^2"),
+    option(float, "--length M", "of the stretched robot [m] (default: the problem's)"),
+    option(float, "--mass KG", "of the robot [kg] (default: the problem's)"),
+    option(float, "--gravity G", "default: the problem's, or 9.81 m/s^2"),
 )
-PERIOD = option(float, "--period", "S", "seconds per period")
-MAX_SPEED = option(float, "--max-speed", "V", "of the joints [rad/s], one or one each", nargs="+")
-MAX_TORQUE = option(float, "--max-torque", "M", "of the joints [N m], one or one each", nargs="+")
+PERIOD = option(float, "--period S", "seconds per period")
+MAX_SPEED = option(float, "--max-speed V", "of the joints [rad/s], one or one each", nargs="+")
+MAX_TORQUE = option(float, "--max-torque M", "of the joints [N m], one or one each", nargs="+")
 
 
 def problem_changes(options: argparse.Namespace) -> dict[str, Any]:

@@ -26,9 +26,7 @@ _TOLERANCE = 1e-6
 _AGREEMENT, _SAME_SIZE = 3.0, 10.0
 _MOST_INSTANTS = 100_000
 _ROBOT = ("length", "mass", "gravity", "period", "max_speed", "max_torque")
-_REPLAY = cli.option(
-    float, "--tolerance", "TOL", "of the replayed efficiency, relative", _TOLERANCE
-)
+_REPLAY = cli.option(float, "--tolerance TOL", "of the replayed efficiency, relative", _TOLERANCE)
 _DRY = cli.flag("--dry", "also bounds under dry friction, with no delta")
 _ERRORS = {
     **{name: f"{name}_error" for name in ("efficiency", "value", "distance", "work")},
@@ -47,12 +45,12 @@ _ENDINGS = {
 }
 _BESIDE = "beside", {"metavar": "OTHER.h5", "nargs": "?", "help": "another result, shown beside it"}
 _SERVO = tuple(
-    cli.option(kind, f"--{name}", metavar, f"of servos: {what}, one or one each", nargs="+")
-    for kind, name, metavar, what in (
-        (float, "neutral", "PULSE", "pulse of the straight joint (default: 1500)"),
-        (float, "scale", "PULSES", "pulses per degree (default: 2000 for 180 degrees)"),
-        (int, "sign", "SIGN", "1, or -1 where larger pulses turn clockwise"),
-        (float, "clamp", "PULSE", "LOW HIGH (default: 500 2500, without --scale)"),
+    cli.option(kind, f"--{name}", f"of servos: {what}, one or one each", nargs="+")
+    for kind, name, what in (
+        (float, "neutral PULSE", "pulse of the straight joint (default: 1500)"),
+        (float, "scale PULSES", "pulses per degree (default: 2000 for 180 degrees)"),
+        (int, "sign SIGN", "1, or -1 where larger pulses turn clockwise"),
+        (float, "clamp PULSE", "LOW HIGH (default: 500 2500, without --scale)"),
     )
 )
 
@@ -96,7 +94,7 @@ are compared with those of another result, at the start phase and the symmetry o
     cli.RESULT,
     _REPLAY,
     _DRY,
-    cli.option(str, "--compare", "FILE.h5", "compare with this result, and replay neither"),
+    cli.option(str, "--compare FILE.h5", "compare with this result, and replay neither"),
 )
 def verify(options: argparse.Namespace) -> int:
     if not 0 < options.tolerance < 1:
@@ -190,7 +188,7 @@ The page needs no network and no other file. Results that failed get one too; th
     cli.RESULT,
     _BESIDE,
     cli.option(
-        str, "--problem", "FILE.py", "problem file with the REFERENCE to compare the result with"
+        str, "--problem FILE.py", "problem file with the REFERENCE to compare the result with"
     ),
     cli.flag("--figures", "also write publication figures, PDF and PNG, one panel each"),
     *cli.ROBOT,
@@ -240,16 +238,12 @@ and periods, or metres and seconds where both problems state a robot.
     cli.RESULT,
     _BESIDE,
     cli.option(
-        str,
-        "--format",
-        None,
-        "default: by the suffix of --output, else gif",
-        choices=("gif", "mp4"),
+        str, "--format", "default: by the suffix of --output, else gif", choices=("gif", "mp4")
     ),
-    cli.option(int, "--periods", "N", "periods in a row (default: 2)", 2),
-    cli.option(float, "--seconds", "S", "per period (default: that of the robot, or 4)"),
-    cli.option(float, "--fps", "N", "frames per second (default: 20)", 20.0),
-    cli.option(int, "--width", "PIXELS", "default: 900", 900),
+    cli.option(int, "--periods N", "periods in a row (default: 2)", 2),
+    cli.option(float, "--seconds S", "per period (default: that of the robot, or 4)"),
+    cli.option(float, "--fps N", "frames per second (default: 20)", 20.0),
+    cli.option(int, "--width PIXELS", "default: 900", 900),
     cli.flag("--from-rest", "with inertia: the first periods of a body that starts at rest"),
     cli.flag("--no-arrows", "do not draw friction"),
     cli.output("folder or file (default: beside the result)"),
@@ -290,19 +284,18 @@ of a smooth body). Joints count from tail to head; angles are positive counter-c
 neutral + sign * scale * degrees; what is clamped is counted. C has pulses if one of these is given.
 """,
     cli.RESULT,
-    cli.option(float, "--rate", "HZ", "samples a second (default: 50)", 50.0),
+    cli.option(float, "--rate HZ", "samples a second (default: 50)", 50.0),
     cli.PERIOD,
     cli.MAX_SPEED,
     *cli.ROBOT,
-    cli.option(int, "--periods", "N", "repeat the period N times (default: 1)", 1),
+    cli.option(int, "--periods N", "repeat the period N times (default: 1)", 1),
     ("--ramp", {
         "action": argparse.BooleanOptionalAction, "default": True,
         "help": "begin straight, at rest, before time 0 (default)",
     }),
     cli.option(
-        str, "--format", None, "default: --output's, else csv",
-        choices=tuple(_ENDINGS),
-    ),
+        str, "--format", "default: --output's, else csv",
+        choices=tuple(_ENDINGS)),
     cli.flag("--degrees", "instead of radians, in CSV and JSON"),
     *_SERVO,
     cli.output("folder or file (default: beside the result)"),

@@ -45,56 +45,6 @@ EXIT = {
     CERTIFICATE_FAILED: FAILED,
     INTERRUPTED: CODE_INTERRUPTED,
 }
-_WHEELS = """\
-tuple(
-            Wheel(link, rolling={rolling:g}, sideways={mu:g}, axle=True) for link in range({links})
-        )"""
-_STANDS_ON = {
-    "feet": """
-    # and what they stand on: feet on each link, evenly spread; or one by one,
-    # feet=(Foot(0), Wheel(1), ...)""",
-    "wheels": """
-    # and what they stand on: a wheel on an axle in the middle of each link, and what resists its
-    # rolling and its slip sideways, over its load. A robot that rolls easily coasts: its best
-    # gait takes many cycles to come to its speed""",
-    "from": """
-    # as {source} has it, with the same angles, which count from the tail and counter-clockwise,
-    # but for signs: {joints}""",
-}
-_SIZE = """\
-    # distance that a gait must go in a period, in body lengths; where the farthest gait goes less,
-    # half of what it goes. Without it the most efficient gait may be one that hardly moves
-    least_distance=0.1,
-"""
-_ROBOT = """\
-    # the robot in SI units: metres, kilograms, seconds, rad/s, N m, W, rad. Its inertia, its limits
-    # and the objective follow, the least energy of the battery per metre
-    robot=Robot({robot}),
-"""
-_TEMPLATE = '''\
-"""{links} links: change what is yours, then `colloc solve {file}`."""
-
-from colloc import {names}
-
-PROBLEM = Problem(
-    name="{name}",
-    # link lengths from tail to head; they add up to 1, the unit of length{floor}
-    # what sliding sideways, forwards and backwards costs, in units of the weight;
-    # friction does not depend on speed
-    friction=Friction(mu_t={mu:g}, mu_f={mu:g}, mu_b={mu:g}),
-    # the class of gaits to search, which decides the answer: more harmonics allow finer motions.
-    # "bilateral": the body run backwards in time looks the same from its head; it never turns,
-    # and half a period is enough. It needs lengths that read the same from both ends, and a robot
-    # whose inertia does not count.
-    # Others: "antipodal" (the second half mirrors the first), "none"
-    gait=Harmonic(harmonics=2, symmetry="{symmetry}"),
-    # the largest angle of a joint [rad], at most pi. In degrees: `from math import radians`
-    # above, and radians(100) here
-    joint_limit={joint_limit},
-{robot}    # No guess is needed: travelling waves, known gaits and random ones are tried.
-    # guess=Fourier(mean, cos, sin) adds yours.
-)
-'''
 _SI: dict[str, tuple[dict[str, float], str, str]] = {
     "length": ({"m": 1.0, "cm": 0.01, "mm": 0.001}, "M", "of the stretched robot"),
     "mass": ({"kg": 1.0, "g": 0.001}, "KG", "of the robot"),
@@ -139,30 +89,27 @@ The file runs as it is; one that is there already is left alone. A robot of --le
   colloc init mine.py --links 22 30 30 22 --wheels --mu 0.3 --joint-limit 85deg \\
       --length 0.62 --mass 0.9 --period 2.5 --max-speed 5 --max-torque 1.2 --idle-power 2
   colloc solve mine.py""",
-    cli.option(Path, "problem", "FILE.py", "the file to write"),
+    cli.option(Path, "problem FILE.py", "the file to write"),
     cli.option(
         float,
-        "--links",
-        "N",
+        "--links N",
         f"equal links (default: {_FEWEST}); or their lengths, tail to head, in any unit",
         nargs="+",
     ),
-    cli.option(Path, "--from", "FILE", "URDF or MJCF of the robot, a planar chain"),
-    cli.option(int, "--feet", "N", "feet on each link (default: none, links lie flat)"),
+    cli.option(Path, "--from FILE", "URDF or MJCF of the robot, a planar chain"),
+    cli.option(int, "--feet N", "feet on each link (default: none, links lie flat)"),
     cli.flag("--wheels", "a wheel in the middle of each link"),
-    cli.option(float, "--mu", "MU", "coefficient of friction (default: the file's, or 1)", least=0),
+    cli.option(float, "--mu MU", "coefficient of friction (default: the file's, or 1)", least=0),
     cli.option(
         _in_units(_ANGLES),
-        "--joint-limit",
-        "ANGLE",
+        "--joint-limit ANGLE",
         f"largest angle of a joint [rad] (default: {_LARGEST})",
         least=0,
     ),
     *(
         cli.option(
             _in_units(units),
-            f"--{name.replace('_', '-')}",
-            metavar,
+            f"--{name.replace('_', '-')} {metavar}",
             what,
             least=0,
             **({"nargs": "+"} if name == "period" else {}),
@@ -171,6 +118,8 @@ The file runs as it is; one that is there already is left alone. A robot of --le
     ),
 )
 def init(options: argparse.Namespace) -> int:
+    from colloc.pictures import render
+
     path: Path = options.problem
     source: Path | None = getattr(options, "from")
     for one, other in (("feet", "wheels"), ("from", "links")):
@@ -202,36 +151,34 @@ def init(options: argparse.Namespace) -> int:
     body = Chain(tuple(length / whole for length in lengths), feet=options.feet or 0)
     Problem(path.stem, body=body)
     mu = options.mu or (model and model.mu) or 1.0
-    robot, floor = _stated_robot(options, model), _body(options, model, lengths, mu)
-    limit = f"{options.joint_limit or _LARGEST:.6g}"
-    symmetric, more = lengths == lengths[::-1], _SIZE * ("idle_power" not in robot)
+    robot, wheels = _stated_robot(options, model), bool(options.wheels)
+    feet = options.feet or ""
+    if model and model.feet and not (wheels or feet):
+        feet = f"({', '.join(model.feet)})".format(mu=mu, rolling=_ROLLING)
+    limit, weights = f"{options.joint_limit or _LARGEST:.6g}", list[float]()
+    symmetric = lengths == lengths[::-1]
     if model:
+        densities = [m / x for m, x in zip(model.masses, lengths, strict=False)]
+        if densities and max(densities) > (1 + _ALIKE) * min(densities):
+            weights = model.masses
         if options.joint_limit is None:
             each = [f"{b:.6g}" if a == -b else f"({a:.6g}, {b:.6g})" for a, b in model.limits]
             limit = each[0] if len({*each}) == 1 else f"({', '.join(each)})"
         # a body with more to it may differ from both ends
-        symmetric &= not model.feet and "weights" not in floor and "(" not in limit
-    if model and not robot:
-        known = _stated(_known(model))
-        more += f"    # in SI units, with `Robot` imported: robot=Robot(period=..., {known}),\n"
-    smallest = min(mu, _ROLLING) if "Wheel(" in floor else mu
+        symmetric &= not model.feet and not weights and "(" not in limit
+    smallest = min(mu, _ROLLING) if wheels or "Wheel(" in str(feet) else mu
     has_inertia = bool(robot) and Robot(**robot).dimensionless(0.0, smallest)["froude"] != 0
-    parts = ("Foot", "Friction", "Harmonic", "Pad", "Problem", "Robot", "Wheel")
-    needs = "Friction Harmonic Problem" + " Robot" * bool(robot)
-    content = _TEMPLATE.format(
-        links=links,
-        file=path.name,
-        name=path.stem,
-        names=", ".join(["Chain", *(x for x in parts if x in needs or f"{x}(" in floor)]),
-        floor=floor,
-        mu=mu,
-        joint_limit=limit,
-        robot=_ROBOT.format(robot=_stated(robot)) * bool(robot) + more,
-        symmetry="bilateral" if symmetric and not has_inertia else "none",
-    )
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(content)
+            file.write(
+                render(
+                    "problem.txt", path=path, model=model, source=source and source.name,
+                    lengths=lengths, weights=weights, wheels=wheels, rolling=_ROLLING, mu=mu,
+                    feet=feet, limit=limit,
+                    robot=_stated(robot), known=_stated(_known(model) if not robot else {}),
+                    symmetry="bilateral" if symmetric and not has_inertia else "none",
+                )
+            )  # fmt: skip
     except FileExistsError:
         raise ProblemError(f"{path} is there already; choose another name.") from None
     try:
@@ -242,10 +189,8 @@ def init(options: argparse.Namespace) -> int:
     facts: dict[str, Any] = {"status": "written", "file": str(path), "links": links}
     lines = [f"wrote {path}: a problem of {links} links. Change it, then: colloc solve {path}"]
     if model:
-        notes = [*model.notes]
-        if options.mu is not None:
-            notes = [note for note in notes if "--mu" not in note]
-        if "feet=" not in floor:
+        notes = [x for x in model.notes if options.mu is None or "--mu" not in x]
+        if not (wheels or feet):
             notes.append("no wheels or feet are known: links lie on the floor (--feet, --wheels)")
         facts |= {"joints": model.joints, "notes": notes}
         lines += [f"  {x}" for x in (f"angles in {source}: {model.joints}", *notes)]
@@ -253,33 +198,14 @@ def init(options: argparse.Namespace) -> int:
     return OK
 
 
-def _body(options: argparse.Namespace, model: Model | None, lengths: list[float], mu: float) -> str:
-    """The lines of the body in a problem file."""
-
-    def shares(values: list[float]) -> str:
-        return f"({', '.join(f'{x:.12g} / {math.fsum(values):.12g}' for x in values)})"
-
-    rows, feet, kind = [shares(lengths)], model.feet if model else [], "from"
-    if model is None:
-        kind = "wheels" if options.wheels else "feet" if options.feet else ""
-    elif model.masses:
-        densities = [m / x for m, x in zip(model.masses, lengths, strict=True)]
-        if max(densities) > (1 + _ALIKE) * min(densities):
-            rows.append(f"weights={shares(model.masses)}")
-    if options.wheels or options.feet or feet:
-        each = _WHEELS if options.wheels else str(options.feet or f"({', '.join(feet)})")
-        rows.append(f"feet={each.format(mu=mu, rolling=_ROLLING, links=len(lengths))}")
-    about = {"source": getattr(options, "from").name, "joints": model.joints} if model else {}
-    inner = rows[0] if len(rows) == 1 else "\n        " + ",\n        ".join(rows) + ",\n    "
-    return f"{_STANDS_ON.get(kind, '').format(**about)}\n    body=Chain({inner}),"
-
-
 def _stated(values: dict[str, Any]) -> str:
     return ", ".join(f"{name}={value!r}" for name, value in values.items())
 
 
-def _known(model: Model) -> dict[str, Any]:
+def _known(model: Model | None) -> dict[str, Any]:
     """Arguments of a `Robot` that its file states."""
+    if model is None:
+        return {}
     whole = {"length": [math.fsum(model.lengths)], "mass": [math.fsum(model.masses)]}
     each = whole | {"max_speed": model.max_speed, "max_torque": model.max_torque}
     rows = {name: [float(f"{x:.9g}") for x in values] for name, values in each.items()}
@@ -291,7 +217,7 @@ def _stated_robot(options: argparse.Namespace, model: Model | None) -> dict[str,
     robot = {name: x for name in _SI if (x := getattr(options, name)) is not None}
     if not robot:
         return {}
-    robot = (_known(model) if model else {}) | robot
+    robot = _known(model) | robot
     if missing := [f"--{name}" for name in [*_SI][:3] if name not in robot]:
         raise ProblemError(
             f"a robot in SI units needs --length, --mass and --period; {' and '.join(missing)} "
@@ -482,20 +408,18 @@ from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
   colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
   colloc solve mine.py --start results/three_link.h5      begin with the gait of another result""",
     *cli.PROBLEM,
-    cli.option(str, "--start", "FILE.h5", "start from the gait of an earlier result"),
+    cli.option(str, "--start FILE.h5", "start from the gait of an earlier result"),
     cli.flag("--fresh", "do not go on from an interrupted run"),
     cli.output("folder, or .h5 file (default: results/NAME.h5)"),
     cli.option(
         int,
-        "--starts",
-        "N",
+        "--starts N",
         "minimum number of starting points (default: 32); 1: the guess alone",
         least=1,
     ),
     cli.option(
         float,
-        "--seconds",
-        "S",
+        "--seconds S",
         "wall time allowed; then the best gait so far counts",
         math.inf,
         least=0,
@@ -503,7 +427,6 @@ from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
     cli.option(
         str,
         "--search",
-        None,
         "reduced: SQP on the gait's parameters, confirmed by IPOPT on the full program (default); "
         "full: IPOPT on the full program at every level of delta, from the guess alone",
         "reduced",
@@ -597,12 +520,10 @@ def solve(options: argparse.Namespace) -> int:
 
 
 _OF_A_GAIT = (
-    cli.option(
-        str, "problem", None, "a Python file that states PROBLEM, for body, friction and limits"
-    ),
-    cli.option(str, "gait", "GAIT.csv", "times and joint angles"),
-    cli.option(float, "--period", "T", "in the file's unit of time (default: from repetition)"),
-    cli.option(int, "--harmonics", "N", "of the fit (default: as many as the samples determine)"),
+    cli.option(str, "problem", "a Python file that states PROBLEM, for body, friction and limits"),
+    cli.option(str, "gait GAIT.csv", "times and joint angles"),
+    cli.option(float, "--period T", "in the file's unit of time (default: from repetition)"),
+    cli.option(int, "--harmonics N", "of the fit (default: as many as the samples determine)"),
     cli.flag("--degrees", "angles are degrees where names do not say what they are"),
 )
 
@@ -641,8 +562,8 @@ of its tail link. Axes may lie anywhere. Errors are two standard deviations.
 
   colloc identify problems/three_link.py floor.csv --length 0.62""",
     *_OF_A_GAIT,
-    cli.option(float, "--length", "M", "of the robot [m] (default: the problem's)", least=0),
-    cli.option(float, "--mu-forward", "MU", "the forward coefficient, measured otherwise", least=0),
+    cli.option(float, "--length M", "of the robot [m] (default: the problem's)", least=0),
+    cli.option(float, "--mu-forward MU", "the forward coefficient, measured otherwise", least=0),
 )
 def identify(options: argparse.Namespace) -> int:
     from colloc.search.identify import identify as identify_friction
