@@ -121,7 +121,6 @@ def _spell_out(error: UnicodeError) -> tuple[str | bytes, int]:
 
 @contextlib.contextmanager
 def _short_warnings() -> Iterator[None]:
-    """Print warnings of colloc as one line on standard error."""
     own = OrderWarning, ReadOnlyRunWarning, SlowWarning
     with warnings.catch_warnings():
         before = warnings.showwarning

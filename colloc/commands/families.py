@@ -289,7 +289,6 @@ def sweep_summary(study: Study, table: StudyTable, path: Path) -> tuple[dict[str
 
 
 def _begin(options: argparse.Namespace, ending: str) -> tuple[ProblemFile, Path, int | None]:
-    """The problem, the table to write and the number of starts, if one is stated."""
     stated, problem = cli.read_problem(options)
     table = cli.output_path(options, Path("results") / f"{problem.name}.{ending}")
     return replace(stated, problem=problem), table, options.starts or stated.starts

@@ -83,7 +83,6 @@ def find_front(options: argparse.Namespace, stated: ProblemFile, table: Path, **
 def _front_table(
     front: ParetoFront, members: dict[Path, Solution]
 ) -> tuple[str, dict[str, Any], list[str]]:
-    """Text of the table of a front, facts about it, and lines for people."""
     (names, shown), gaps = front.in_units, {gap.after: gap for gap in front.gaps}
     aims, rows = [aim.expression for aim in front.objectives], list[dict[str, Any]]()
     lines = [

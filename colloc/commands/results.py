@@ -148,7 +148,6 @@ def verify(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace, a: Solution, b: Solution) -> int:
-    """Print two results and the changes of their problems side by side; the exit code."""
     (same, sentence), (rows, changes) = verdict(a, b), compare(a, b)
     rows = [("", a.problem.name, b.problem.name), *rows]
     facts = {
@@ -301,6 +300,7 @@ neutral + sign * scale * degrees; what is clamped is counted. C has pulses if on
     cli.output("folder or file (default: beside the result)"),
 )  # fmt: skip
 def export(options: argparse.Namespace) -> int:
+    from colloc.pictures import render
     from colloc.pictures.controllers import Servo
 
     source = Path(options.result)
@@ -315,64 +315,11 @@ def export(options: argparse.Namespace) -> int:
     names = ("period", "max_speed", "rate", "periods", "ramp", "degrees")
     settings = cli.values(options, *names, "length", "mass", "gravity")
     facts = solution.export(path, **settings, servo=servo) | {"file": str(path)}
-    if path.suffix in (".xml", ".urdf"):
-        lines = [
-            f"saved {path}: a robot of {facts['length_m']:g} m and {facts['mass_kg']:g} kg; "
-            f"its joint angles: --format csv"
-        ]
-        if (moves := facts.get("moves_body_lengths_per_period")) is not None:
-            lines.append(
-                f"  colloc has it move {moves:.4g} body lengths a period on its floor, with "
-                "inertia, once it has settled"
-            )
-        lines += [f"  note: {facts['note']}"] if "note" in facts else []
-    else:
+    if "samples_per_period" in facts:
         facts["samples"] = facts["samples_per_period"] * options.periods
-        lines = _trajectory_lines(solution, facts, options.periods)
-    cli.tell(options, facts, lines)
+    text = render("export.txt", f=facts, solution=solution, periods=options.periods)
+    cli.tell(options, facts, text.splitlines())
     return OK
-
-
-def _trajectory_lines(solution: Solution, facts: dict[str, Any], periods: int) -> list[str]:
-    fastest = ", ".join(f"{speed:.3g}" for speed in facts["largest_speed_rad_per_s"])
-    lines = [
-        f"saved {facts['file']}: {facts['samples']} samples, period {facts['period_s']:g} s",
-        f"  {solution.gait.motor_gait.coordinate} speeds up to {fastest} rad/s; "
-        f"{facts['distance_per_period_body_lengths']:.4g} body lengths a period",
-    ]
-    if "ramp_s" in facts:
-        lines.append(
-            f"  {facts['ramp_s']:g} s before time 0 lead from straight, at rest, into the gait "
-            f"(--no-ramp leaves them out)"
-        )
-    if "ramp_out_s" in facts:
-        lines.append(f"  {facts['ramp_out_s']:g} s after the gait lead back to straight, at rest")
-    if "end_body_lengths" in facts:
-        x, y = (facts.get("length_m", 1.0) * place for place in facts["end_body_lengths"])
-        unit = "m" if "length_m" in facts else "body lengths"
-        ahead, aside = "ahead" if x >= 0 else "behind", "left" if y >= 0 else "right"
-        how = "with inertia" if facts["end_includes_inertia"] else "in slow motion"
-        lines.append(
-            f"  after {periods} period{'s' * (periods > 1)} its centre is {abs(x):.3g} {unit} "
-            f"{ahead} and {abs(y):.3g} to the {aside} of where it was straight, its tail link "
-            f"turned by {facts['end_turned_deg']:.3g}° ({how})"
-        )
-    if "pulses" in facts:
-        stated = (
-            f"{name} {', '.join(f'{x:.6g}' for x in facts[name] or ()) or 'none'}"
-            for name in ("neutral", "scale", "sign", "clamp")
-        )
-        lines.append(f"  pulses: {'; '.join(stated)}")
-        if any(clamped := facts["clamped_samples"]):
-            counts = ", ".join(f"{n} of joint {j}" for j, n in enumerate(clamped, 1) if n)
-            lines.append(f"  note: pulses are clamped, {counts}: the robot does another gait")
-    if solution.turning:
-        lines.append(f"  {solution.turning}")
-    if "pace" in facts:
-        lines.append(f"  pace: {facts['pace']}")
-    if not solution.success:
-        lines.append(f"  note: the result is not certified ({solution.status})")
-    return lines
 
 
 @cli.command(

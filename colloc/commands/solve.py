@@ -22,8 +22,6 @@ from colloc.gaits.regime import Free
 from colloc.gaits.robot import Robot
 from colloc.mechanics.chain import Chain
 from colloc.results import limit_use
-from colloc.results.answer import EVALUATED, PRESCRIBED, REDUCED
-from colloc.results.checks import BACKLASH
 from colloc.results.kept import Saved, save_result
 from colloc.results.robot import in_si
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
@@ -242,116 +240,24 @@ def summary_lines(
     solution: Solution, reference: Reference | None, *, verbose: bool = False
 ) -> list[str]:
     """Lines about a result for people; with `verbose` also the search, the gait and every check."""
-    verdict = f"{solution.problem.name}: {solution.status} in {solution.seconds:.1f} s"
-    lines, period = [f"  {solution.message}"] if solution.message else [], solution.certificate
-    if not period.replayed:
-        return [verdict, *lines]
-    if solution.answer.program not in (PRESCRIBED, EVALUATED):
-        verdict += f" ({solution.standing[0]})"
-    if any(check.name == BACKLASH for check in solution.certificate.failures):
-        verdict += ": too small for this robot"
-    elif solution.is_tiny:
-        verdict += ": a tiny gait"
-    rows = [*_quantities(solution), *(_background(solution) if verbose else [])]
-    table = [f"  {name:<15s} {text}" for name, text in rows]
-    if reference is not None:
-        lines.insert(0, f"  {reference.verdict(period.efficiency)}")
-    # every check; or those that failed, and the one nearest to its tolerance of the others
-    checks = [f"  {each.line()}" for each in (period.checks if verbose else period.failures)]
-    if passed := [] if verbose else [check for check in period.checks if check.passed]:
-        nearest = max(passed, key=lambda check: abs(check.value) / max(check.threshold, 1e-300))
-        which = f"{'' if checks else 'all '}{len(passed)} checks passed"
-        value = f"{abs(nearest.value):.1e}, tolerance {nearest.threshold:.0e}"
-        checks.insert(0, f"  {which} (tightest: {nearest.name} {value})")
-    return [verdict, *table, *checks, *lines]
+    from colloc.pictures import render
 
-
-def _quantities(solution: Solution) -> list[tuple[str, str]]:
-    """Numbers of a period that matter to its objective and limits."""
-    period, problem = solution.certificate, solution.problem
-    text = (
-        f"{period.value:.6f} +- {period.value_error:.0e}, re-simulated at {period.instants} time "
-        f"points; {period.value_at_zero_delta:.6f} +- {period.value_error_at_zero_delta:.0e} for "
-        f"delta -> 0"
-    )
-    rows = [*_in_si(solution), (problem.objective.label, text)]
-    if problem.objective != EFFICIENCY:
-        text = f"{period.efficiency:.6f} +- {period.efficiency_error:.0e}"
-        rows.append((EFFICIENCY.label, text))
-    if period.dry is not None:
-        low, high = period.dry
-        rows.append(("dry friction", f"between {low:.8f} and {high:.8f}, with no delta"))
-    for each in problem.integrals:
-        rows.append((each.name.replace("_", " "), f"{period.values[each.name]:.6f}"))
+    problem, pace, slowly, moves = solution.problem, None, None, list[float]()
+    replayed = solution.certificate.replayed
     if isinstance(problem.froude, Free):
-        pace, (low, high) = solution.froude, problem.froude
-        ends = ((low, ", the slowest allowed"), (high, ", the fastest allowed"))
-        end = next((text for x, text in ends if math.isclose(pace, x, rel_tol=1e-5)), "")
-        rows.append(("pace", f"Froude number {pace:.4g}{end}"))
-    with suppress(NotConvergedError):  # a body that slides down a slope
-        if problem.froude:
-            what = f"({problem.objective.short} of the same gait without inertia)"
-            rows.append(("played slowly", f"{solution.played_slowly:.6f} {what}"))
-            cycles, reached = solution.cycles_from_rest
-            rows.append(("from rest", f"{reached:.3g} of its length in cycle {cycles}"))
-    if (held := solution.share_held).any():
-        shares = ", ".join(f"{100 * share:.0f}" for share in held)
-        rows.append(("feet stick", f"during {shares} % of the period (tail to head)"))
-    if (travels := solution.travels) != "head first":
-        rows.append(("travels", travels))
-    rows += [("limits", text) for text in limit_use.lines(solution)]
-    if problem.rotation != 0:
-        rows.append(("net rotation", f"{period.rotation:.6f} rad: {solution.turning}"))
-    distance, work = (
-        f"{getattr(period, name):.6f} +- {period.errors[name]:.0e}" for name in ("distance", "work")
-    )
-    text = f"{distance}      work W  {work}      at delta {solution.answer.delta:.0e}"
-    rows.append(("distance d", text))
+        ends = zip(problem.froude, (", the slowest allowed", ", the fastest allowed"), strict=True)
+        at_end = (text for x, text in ends if math.isclose(solution.froude, x, rel_tol=1e-5))
+        pace = solution.froude, next(at_end, "")
+    if problem.froude and replayed:
+        with suppress(NotConvergedError):  # a body that slides down a slope
+            slowly = solution.played_slowly, *solution.cycles_from_rest
     if isinstance(problem.body, Chain) and problem.gait.free:
-        degrees = ", ".join(f"{math.degrees(swing):.0f}" for swing in solution.swings)
-        what = "joints move" if problem.joint_map is None else "motors turn"
-        way = f"the body by {period.distance:.3g} of its length"
-        rows.append(("motion", f"{what} by {degrees} degrees (tail to head), {way}"))
-    return rows
-
-
-def _in_si(solution: Solution) -> list[tuple[str, str]]:
-    """Speed and energy of the problem's robot."""
-    if not (f := in_si(solution)):
-        return []
-    way, time = f["distance_per_cycle_m"], f["period_s"]
-    rows = [
-        ("speed", f"{100 * way / time:.4g} cm/s: {100 * way:.4g} cm in a cycle of {time:.4g} s")
-    ]
-    if "energy_J_per_m" in f:
-        motors, idle = f["motor_work_per_cycle_J"], f["idle_energy_per_cycle_J"]
-        rows.append(
-            (
-                "energy",
-                f"{f['energy_J_per_m']:.4g} J/m; a cycle takes {motors:.3g} J of the motors and "
-                f"{idle:.3g} J of the electronics",
-            )
-        )
-    return rows
-
-
-def _background(solution: Solution) -> list[tuple[str, str]]:
-    problem, answer = solution.problem, solution.answer
-    measured = f"measured on a mesh of {answer.edges.size - 1} intervals"
-    if answer.program == PRESCRIBED:
-        search = [f"nothing is free: the motion is prescribed, {measured}"]
-    elif answer.program == EVALUATED:
-        search = [f"nothing is sought: the gait was given, {measured}"]
-    else:
-        reduced = answer.program == REDUCED
-        how = answer.status if reduced else f"{answer.iterations} iterations of IPOPT"
-        rows = f"{answer.x.size} variables, {answer.lam_g.size} constraints"
-        program = f"{problem.formulation} program: {rows}, {how}"
-        search = [f"{program}, KKT error {answer.kkt_error:.0e}", *solution.standing]
-    paced = f"; run in a period of 1, as {problem.paced_by}" if problem.paced_by else ""
-    gait = [f"class: {problem.gait.describe()}{paced}", *solution.gait.lines()]
-    scene = [("scene", problem.scene)] if problem.scene else []
-    return [*(("search", x) for x in search), *scene, *(("gait", x) for x in gait)]
+        moves = [math.degrees(swing) for swing in solution.swings]
+    return render(
+        "summary.txt", solution=solution, reference=reference, verbose=verbose, slowly=slowly,
+        si=in_si(solution), limits=limit_use.lines(solution) if replayed else [], pace=pace,
+        moves=moves, whole=lambda row: ", ".join(f"{x:.0f}" for x in row), efficiency=EFFICIENCY,
+    ).splitlines()  # fmt: skip
 
 
 def summary_dict(

@@ -146,7 +146,6 @@ class Basis(LinearClass):
 
 
 def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
-    """Sample or read columns; as nested tuples."""
     phases = np.arange(_SAMPLED) / _SAMPLED
     if isinstance(columns, (str, os.PathLike)):
         columns = _read(Path(columns))

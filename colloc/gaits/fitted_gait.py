@@ -177,8 +177,6 @@ def _numbers(name: str, source: object) -> np.ndarray:
 
 
 class _Fit(NamedTuple):
-    """A series to be fitted to angles at times from 0."""
-
     harmonics: int
     drifts: bool  # whether the record drifts
     score: float  # mean square residual over the square of the share of numbers that are left
@@ -231,7 +229,6 @@ class _Samples(NamedTuple):
         return fits
 
     def check(self, period: float | None, harmonics: int | None) -> None:
-        """Raise a `ProblemError` if the samples do not determine such a series."""
         step, most, span = self.step, (self.time.size - 3) // 2, self.time[-1]
         what = ""
         if period is not None and (not np.isfinite(period) or period <= 0):

@@ -87,7 +87,6 @@ class Fourier(GaitFunction):
 
     @cached_property
     def _terms(self) -> tuple[np.ndarray, np.ndarray]:
-        """Frequencies ``(K, 1)``, and angles and rates ``(2 n_joint, 2 K)`` per cosine and sine."""
         k = 2 * np.pi * np.arange(1, self.n_harmonic + 1)
         return k[:, None], np.block([[self.cos, self.sin], [k * self.sin, -k * self.cos]])
 

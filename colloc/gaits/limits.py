@@ -73,7 +73,6 @@ def checked_actuator_limit(name: str, limit: Any, n_joint: int) -> Limit | None:
 
 
 def _numbers(limit: Any) -> tuple[float, ...]:
-    """The numbers of a limit; none if they are no numbers."""
     each = np.ravel(np.asarray(limit, dtype=object))
     return tuple(float(a) for a in each) if all(map(is_number, each)) else ()
 

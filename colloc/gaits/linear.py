@@ -283,7 +283,6 @@ class LinearClass:
         return self.member(v + by, gait.n_joint)
 
     def _sizes(self, n_joint: int) -> np.ndarray:
-        """Largest angle per unit of each parameter [rad]."""
         return np.abs(self.angle_matrix(self.instants, n_joint)).max(axis=(0, 1))
 
 

@@ -91,7 +91,6 @@ def parameters(problem: Problem) -> list[Parameter]:
 
 
 def _coefficients(law: Law) -> list[tuple[str, float]]:
-    """Coefficients of a law by name; those of a law of formulas may bear the same names."""
     stated = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
     return [(field, float(stated[field])) for field in COEFFICIENTS if is_number(stated.get(field))]
 

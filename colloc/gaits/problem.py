@@ -242,7 +242,6 @@ class Problem:
             object.__setattr__(self, name, value)
 
     def _derive(self) -> None:
-        """Set what follows from the robot."""
         if self.robot is None:
             self._fill(objective=EFFICIENCY)
             return
@@ -356,7 +355,6 @@ class Problem:
             )
 
     def _check_gaits(self) -> None:
-        """Raise a `ProblemError` if the body has no such gaits, or none that goes anywhere."""
         gaits, symmetry = self.gait, self.gait.symmetry
         if symmetry not in self.body.symmetries:
             raise ProblemError(

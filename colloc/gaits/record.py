@@ -252,7 +252,6 @@ def _joints(
 
 
 def _markers(path: Path, columns: list[Column], n_point: int) -> list[Column]:
-    """The columns x and y of all points, from tail to head."""
     sides = [
         sorted((c for c in columns if axis in c.words), key=lambda column: column.numbers)
         for axis in "xy"
@@ -303,7 +302,6 @@ def _refuse(path: Path, what: str) -> NoReturn:
 
 
 def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, str]:
-    """Times of all rows, and their unit in words."""
     if not clock:
         samples = np.arange(len(table.lines), dtype=float)
         return samples, "in equal steps, a sample each, as no column holds it"
@@ -406,7 +404,6 @@ def _units(path: Path, table: Table, joints: list[Column], degrees: bool) -> np.
 def _check_size_of_angles(
     path: Path, joints: list[Column], raw: np.ndarray, units: np.ndarray
 ) -> None:
-    """Raise a `ProblemError` for numbers ``(n_joint, n_time)`` too large for their unit."""
     largest = np.abs(raw).max(axis=1)
     worst = int((largest * units).argmax())
     name, most = joints[worst].name, largest[worst]

@@ -58,8 +58,6 @@ class Model(NamedTuple):
 
 @dataclass(eq=False)
 class _Part:
-    """A rigid part in the axes of the world."""
-
     name: str
     parent: _Part | None = None
     joint: str = ""

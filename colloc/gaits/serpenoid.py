@@ -183,7 +183,6 @@ class Serpenoid(Harmonic):
 
 
 def _places(n_joint: int) -> np.ndarray:
-    """Numbers of the joints, counted from the middle."""
     return np.arange(n_joint) - 0.5 * (n_joint - 1)
 
 

@@ -300,8 +300,6 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
 
 
 class _Ticks(MaxNLocator):
-    """Round numbers of another unit."""
-
     def __init__(self, size: float) -> None:
         super().__init__(7, steps=[1, 2, 5, 10])
         self._size = size
@@ -391,7 +389,6 @@ def draw_shape_path(axes: Axes, solution: Solution, first: int = 0) -> None:
 
 
 def _draw_speeds(axes: Axes, solution: Solution) -> None:
-    """Sliding speeds over a period on a logarithmic scale, with delta: below it, sticking."""
     motion, delta = solution.sample(_T), solution.delta_per_period
     part, speed = part_speeds(solution.problem.body, motion)
     units = drawn_units(solution)
@@ -565,7 +562,6 @@ def _draw_series(
 
 
 def _draw_key(axes: Axes, of: str = "", more: Mapping[str, Any] | None = None) -> None:
-    """Legend of the lines, and of more marks, in a row above the axes."""
     handles, labels = axes.get_legend_handles_labels()
     handles, labels = [*handles, *(more or {}).values()], [*labels, *(more or {})]
     if of:

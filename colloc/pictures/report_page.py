@@ -234,7 +234,6 @@ def _motion_data(shown: Frames, body: Body) -> dict[str, Any]:
 
 
 def _front_section(front: ParetoFront) -> dict[str, Any]:
-    """Table, pictures and films of a front."""
     points, (names, values) = front.points, front.in_units
     why, rows = {gap.after: gap.why for gap in front.gaps}, list[tuple[str, ...]]()
     for k, (point, numbers) in enumerate(zip(points, values, strict=True)):
@@ -257,7 +256,6 @@ def _front_section(front: ParetoFront) -> dict[str, Any]:
 
 
 def _comparison_section(solution: Solution, other: Solution) -> dict[str, Any]:
-    """Table, pictures and films of two results."""
     both, (rows, changes) = (solution, other), compare(solution, other)
     _, sentence = verdict(solution, other)
     names = [each.problem.name for each in both]
@@ -280,7 +278,6 @@ def _comparison_section(solution: Solution, other: Solution) -> dict[str, Any]:
 
 
 def _films(solutions: Mapping[str, Solution]) -> list[tuple[str, Markup]]:
-    """Films of solutions by their names, at the scale at which the widest fits."""
     shown = {name: _film(each) for name, each in solutions.items()}
     scale = min(min(_FILM / np.ptp(each.window, axis=0)) for each in shown.values())
     return [

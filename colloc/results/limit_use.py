@@ -31,7 +31,6 @@ class _Unit(NamedTuple):
 
 
 def _units(problem: Problem) -> dict[str, _Unit]:
-    """Units of limits by the field of the problem; in SI units those of a robot."""
     units = {
         "speed_limit": _Unit("speed_limit", "rad per period"),
         "torque_limit": _Unit("torque_limit", "weight x body length"),

@@ -257,7 +257,6 @@ class RobotSheet:
 
     @cached_property
     def _with_inertia(self) -> _MotionWithInertia | None:
-        """Motion with inertia of a quasi-static result, if it is found."""
         with suppress(*_UNKNOWN):
             if not self.solution.problem.froude:
                 return _MotionWithInertia(self.solution, self.froude)

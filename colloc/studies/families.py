@@ -193,7 +193,6 @@ def pareto_front(
             progress(len(certified), solution)
 
     def optimum(which: int, level: float, near: _Point) -> _Point:
-        """The best by one objective, from a gait, where the other reaches a level."""
         at_least = *stated.at_least, (aims[which], level)
         asked = stated.with_(objective=aims[1 - which], at_least=at_least, delta_start=stated.delta)
         space, v = space_near(asked, near.gait, near.edges)
