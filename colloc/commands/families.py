@@ -84,14 +84,6 @@ def starts_summary(
 
 
 @cli.command(
-    """\
-Start k of a seed is the same gait whatever --starts and --workers are. What the archive holds is
-not solved again: the same command goes on after Ctrl-C, and more starts and seeds add to it. In
-place of a problem file an archive lists its distinct optima; with --start it makes a result of that
-start like any other, solved again from its gait (from its guess, if it had failed).
-
-  colloc multistart problems/three_link.py --starts 100 --workers 2
-  colloc multistart results/three_link.starts.h5 --start 7     results/three_link.start-7.h5""",
     *cli.PROBLEM,
     _STARTS,
     cli.option(int, "--seed N", "of the sampler (default: 0)", 0, least=0),
@@ -198,9 +190,6 @@ def _open_archive(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    """\
-Starts travel between neighbours. What is done is kept, and not solved again. A study file is Python
-code, and is executed. Exit code 3: some cells have no certified gait.""",
     cli.option(
         str, "study", "a Python file that states STUDY, for example studies/friction_plane.py"
     ),
@@ -301,13 +290,6 @@ def _end(options: argparse.Namespace, found: Found) -> int:
 
 
 @cli.command(
-    """\
-An objective is "efficiency", "speed", "turning", or an expression of distance, work, rotation and
-length of a period. Every point is a result: NAME.front/00.h5 is the best by the first objective,
-the last one the best by the second. Exit code 4: a gap is left where gaits are not certified.
-colloc solve --front begins at the answer.
-
-  colloc pareto mine.py --objectives speed "distance / work" --points 15""",
     *cli.PROBLEM,
     cli.option(
         str,
@@ -330,13 +312,6 @@ def pareto(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    """\
-Positive angles turn left, counter-clockwise. The problem states the gait that goes straight. Every
-gait is a result: NAME.steer/00.h5 turns right the most, NAME.steer/spot_00.h5 with --spot. A
-controller interpolates the joint angles in NAME.steer.json. Chord and radius are those of the arc
-of a period.
-
-  colloc steer mine.py --turn -40 -20 -10 0 10 20 40 --spot -30 30""",
     *cli.PROBLEM,
     cli.option(float,
         "--turn DEG", "per period (default: -30 -15 0 15 30)", [-30.0, -15.0, 0.0, 15.0, 30.0],

@@ -132,21 +132,22 @@ class Parser(argparse.ArgumentParser):
         raise ProblemError(f"{message}; see {self.prog} --help.")
 
 
-def command(epilog: str, *options: Option) -> Callable[[Function], Callable[..., int]]:
+def command(*options: Option) -> Callable[[Function], Callable[..., int]]:
     """Make the subcommand of its name of a function of its options; it is called with the
-    arguments, and returns an exit code."""
+    arguments, and returns an exit code. `help` has a page for each."""
 
     def register(function: Function) -> Callable[..., int]:
         def call(arguments: Sequence[str] | None = None) -> int:
-            what = SUBCOMMANDS[function.__name__][1]
+            name = function.__name__
+            what, page = SUBCOMMANDS[name][1], Path(__file__).with_name("help") / f"{name}.txt"
             parser = Parser(
-                f"colloc {function.__name__}",
+                f"colloc {name}",
                 description=f"{what[0].upper()}{what[1:]}.",
-                epilog=f"{epilog}\n\n{_EXIT_CODES}",
+                epilog=f"{page.read_text(encoding='utf-8')}\n{_EXIT_CODES}",
                 formatter_class=argparse.RawDescriptionHelpFormatter,
             )
-            for name, settings in (*options, *PRINTING):
-                parser.add_argument(name, **settings)
+            for option, settings in (*options, *PRINTING):
+                parser.add_argument(option, **settings)
             if "_ARGCOMPLETE" in os.environ:
                 importlib.import_module("argcomplete").autocomplete(parser)
             return run(parser, function, arguments)

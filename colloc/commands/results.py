@@ -83,14 +83,6 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
 
 
 @cli.command(
-    """\
-The gait in the file is replayed with the NumPy solver on a grid of instants that no earlier replay
-used. KKT error and constraint violation are the solver's own record. With --compare joint angles
-are compared with those of another result, at the start phase and the symmetry of body and friction
-(mirror image, other end, reversed in time) for which they are nearest.
-
-  colloc verify results/three_link.h5 --tolerance 1e-8
-  colloc verify results/a.h5 --compare results/b.h5""",
     cli.RESULT,
     _REPLAY,
     _DRY,
@@ -177,13 +169,6 @@ def _write(path: Path) -> tuple[dict[str, Any], str]:
 
 
 @cli.command(
-    """\
-The page needs no network and no other file. Results that failed get one too; the front that solve
---front left beside the result is in it.
-
-  colloc report results/three_link.h5                 results/three_link.html
-  colloc report results/three_link.h5 --length 1.2 --mass 3 --period 5   of a robot
-  colloc report results/a.h5 results/b.h5             results/a-b.html: a, with b beside it""",
     cli.RESULT,
     _BESIDE,
     cli.option(
@@ -226,14 +211,6 @@ def report(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    """\
-Orange arrows are the friction on the links; the large disc is the head; the small plane shows the
-first two joint angles. Two results are shown side by side, at the same scale and time: body lengths
-and periods, or metres and seconds where both problems state a robot.
-
-  colloc animate results/three_link.h5                            results/three_link.gif
-  colloc animate results/a.h5 results/b.h5                        results/a-b.gif
-  colloc animate results/three_link.h5 --format mp4 --fps 50      needs ffmpeg""",
     cli.RESULT,
     _BESIDE,
     cli.option(
@@ -265,23 +242,6 @@ def animate(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    """\
-With --max-speed the path is retimed as evenly as the limits allow; without --period as fast as they
-allow. Where the pace matters (drag, power limits) the gait's own timing is kept and the period
-stretched. The period is a whole number of samples; the cycle repeats after the last one. Samples
-before time 0 lead from the straight body, at rest, into the gait.
-
-  colloc export results/three_link.h5 --period 4                          50 samples a second
-  colloc export results/three_link.h5 --max-speed 2.0 1.0 --rate 100      as fast as they allow
-  colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3    with torques, powers
-  colloc export results/three_link.h5 --period 5 --length 1.2 --mass 3 --format mjcf    for MuJoCo
-  colloc export results/three_link.h5 --period 4 --format pulses --sign 1 -1    pulses of servos
-  colloc export results/three_link.h5 --period 4 --format ros    a JointTrajectory; c: a C header
-
-Columns: time_s, joint_1_rad, ..., joint_1_rad_per_s, ..., joint_1_N_m, ..., joint_1_W, ... (mode_1
-of a smooth body). Joints count from tail to head; angles are positive counter-clockwise. A pulse is
-neutral + sign * scale * degrees; what is clamped is counted. C has pulses if one of these is given.
-""",
     cli.RESULT,
     cli.option(float, "--rate HZ", "samples a second (default: 50)", 50.0),
     cli.PERIOD,
@@ -323,10 +283,6 @@ def export(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    """\
-Numbers include inertia at the period that is given.
-
-  colloc robot results/three_link.h5 --length 1.2 --mass 3 --period 5 --max-torque 2.5 2.0""",
     cli.RESULT,
     *cli.ROBOT,
     *(cli.PERIOD, cli.MAX_SPEED, cli.MAX_TORQUE),
@@ -349,11 +305,6 @@ def robot(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    """\
-The slope is the exact derivative at the optimum. With --again every number is made a tenth smaller
-and larger and the gait re-optimised, a second or two each.
-
-  colloc sensitivity results/three_link.h5 --again""",
     cli.RESULT,
     cli.flag("--again", "also re-optimise there, and compare with this gait"),
 )

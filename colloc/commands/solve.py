@@ -76,17 +76,6 @@ def _in_units(units: dict[str, float]) -> Callable[[str], float]:
 
 
 @cli.command(
-    """\
-The file runs as it is; one that is there already is left alone. A robot of --length, --mass and
---period is stated in SI units; without these the body is 1 long. Numbers may end in their units:
-62cm, 900g, 85deg.
-
-  colloc init mine.py --links 4 --feet 1
-  colloc init mine.py --links 22 30 30 22 --wheels
-  colloc init mine.py --from robot.urdf --period 2.5
-  colloc init mine.py --links 22 30 30 22 --wheels --mu 0.3 --joint-limit 85deg \\
-      --length 0.62 --mass 0.9 --period 2.5 --max-speed 5 --max-torque 1.2 --idle-power 2
-  colloc solve mine.py""",
     cli.option(Path, "problem FILE.py", "the file to write"),
     cli.option(
         float,
@@ -306,13 +295,6 @@ def bound_facts(bound: Bound | None) -> dict | None:
 
 
 @cli.command(
-    """\
-A failed solve is kept as NAME.failed.h5, a former result of another problem called NAME, or a
-better one of this problem, as NAME.former-1.h5. After Ctrl-C or a crash the same command goes on
-from NAME.run.sqlite; Ctrl-C leaves the best gait so far in NAME.interrupted.h5.
-
-  colloc solve problems/three_link.py --delta 1e-6 --output results/dry.h5
-  colloc solve mine.py --start results/three_link.h5      begin with the gait of another result""",
     *cli.PROBLEM,
     cli.option(str, "--start FILE.h5", "start from the gait of an earlier result"),
     cli.flag("--fresh", "do not go on from an interrupted run"),
@@ -435,14 +417,6 @@ _OF_A_GAIT = (
 
 
 @cli.command(
-    """\
-The file has a line for each time point: its time, then the angle of each joint. Columns are known
-by their names (joint_1 at the tail, joint_2, ...; units as _deg, [deg], time_ms); without names
-they go from tail to head. Angles are radians unless names or --degrees say otherwise. Errors
-include the residual of the samples, with two standard deviations.
-
-  colloc evaluate problems/three_link.py mine.csv                          results/mine-evaluated.h5
-  colloc verify results/mine-evaluated.h5 --compare results/three_link.h5""",
     *_OF_A_GAIT,
     cli.output("folder or .h5 file (default: results/GAIT-evaluated.h5)"),
     cli.VERBOSE,
@@ -460,13 +434,6 @@ def evaluate(options: argparse.Namespace) -> int:
 
 
 @cli.command(
-    """\
-The file has a line for each time point: its time and the angle of each joint, as for evaluate, and
-the place of a point of the body: x, y (the centre of mass), head_x, head_y, tail_x or tail_y, in
-body lengths, or with --length in m (head_x_mm, [cm]); perhaps the direction theta, yaw or heading
-of its tail link. Axes may lie anywhere. Errors are two standard deviations.
-
-  colloc identify problems/three_link.py floor.csv --length 0.62""",
     *_OF_A_GAIT,
     cli.option(float, "--length M", "of the robot [m] (default: the problem's)", least=0),
     cli.option(float, "--mu-forward MU", "the forward coefficient, measured otherwise", least=0),

@@ -99,17 +99,14 @@ class _MotionWithInertia:
     def __init__(self, solution: Solution, froude: float) -> None:
         from colloc.verification.differential_motion import GaitWithInertia  # slow to import
 
-        problem, self._gait = solution.problem, solution.gait
-        moving = GaitWithInertia(
-            problem.body, problem.law, self._gait, solution.delta_per_period,
-            froude=froude, breaks=self._gait.corner_phases, regime=problem.regime,
-        )  # fmt: skip
+        regime, self._gait = solution.problem.regime, solution.gait
+        moving = solution.played_by(GaitWithInertia, froude=froude, regime=regime)
         self._chain, rough = moving.body, moving.find_period()
         self._course = moving.periodic_run(rough.momenta, _ACCURACY, rough.slopes).course
         totals = moving.totals(self._course.states)
         self.work, self.rotation = totals["work"], totals["rotation"]
         self.distance, self._heading = totals["distance"], 0.0
-        if not problem.regime.slides:
+        if not regime.slides:
             path = self._course.at(np.linspace(0.0, 1.0, _INSTANTS + 1))[4:6]
             self.distance = arc(self.rotation, path).chord
             end = self._course.states[4:6, -1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from pathlib import Path
@@ -186,17 +187,18 @@ class Solution:
         turned = f"turns {math.degrees(abs(self.rotation)):.4g}° {side}"
         return f"{turned}, on a circle of radius {self.turning_radius:.4g} body lengths"
 
+    def played_by(self, play: Callable[..., Any], *more: Any, **how: Any) -> Any:
+        """What a replay or another player of gaits returns for this one."""
+        at = self.problem.body, self.problem.law, self.gait, self.delta_per_period
+        return play(*at, *more, breaks=self.gait.corner_phases, **how)
+
     @property
     def played_slowly(self) -> float:
         """The objective of the same gait played so slowly that inertia does not matter;
         `NotConvergedError` if a slope does not hold it then."""
         p = self.problem
-        replay = replayer(p.regime.slowly)(
-            *(p.body, p.law, self.gait, self.delta_per_period),
-            quantities=p.objective.integrals,
-            turn=p.rotation or 0.0,
-            breaks=self.gait.corner_phases,
-        )
+        how: Any = {"quantities": p.objective.integrals, "turn": p.rotation or 0.0}
+        replay = self.played_by(replayer(p.regime.slowly), **how)
         period = {"period": self.froude**-0.5} if self.froude else {}
         return float(p.objective({**replay.values, **period}))
 
@@ -206,11 +208,8 @@ class Solution:
         as once it has settled, within 2 %; and how far it goes in the last of them."""
         from colloc.verification.differential_motion import GaitWithInertia
 
-        p, state, way, cycles = self.problem, np.zeros(7), 0.0, 0
-        moving = GaitWithInertia(
-            *(p.body, p.law, self.gait, self.delta_per_period),
-            froude=self.froude, breaks=self.gait.corner_phases, regime=p.regime,
-        )  # fmt: skip
+        state, way, cycles = np.zeros(7), 0.0, 0
+        moving = self.played_by(GaitWithInertia, froude=self.froude, regime=self.problem.regime)
         state[3] = moving.theta
         while cycles < _MOST_CYCLES and abs(way - self.distance) > _ALIKE * self.distance:
             before, state = state, moving.run(state, _ROUGHLY).states[:, -1]
@@ -227,8 +226,7 @@ class Solution:
         """
         if self.problem.regime.slides:
             raise ProblemError("on a slope it is not known how slow is slow enough.")
-        at = self.problem.body, self.problem.law, self.gait, self.delta_per_period
-        return slow_enough(*at, loss, breaks=self.gait.corner_phases)
+        return float(self.played_by(slow_enough, loss))
 
     def dry(self) -> DryFriction:
         """Distance, work and efficiency at delta = 0, between bounds: the same gait under friction
@@ -291,21 +289,17 @@ class Solution:
         # loads what integrates, which few need
         from colloc.verification.differential_motion import motion_from_rest
 
-        p, chain = self.problem, self.problem.body
+        p = self.problem
         if not p.froude:
             raise ProblemError(
                 f"{p.name} has no inertia, and is under way at once: from rest is for problems "
                 f"with a froude."
             )
-        ran = motion_from_rest(
-            *(chain, p.law, self.gait, self.delta_per_period, self.froude),
-            periods=max(1, int(np.ceil(t[-1]))),
-            grade=p.grade,
-            theta=getattr(self.gait, "theta", None) or 0.0,
-            breaks=self.gait.corner_phases,
-        )
+        how: Any = {"grade": p.grade, "theta": getattr(self.gait, "theta", None) or 0.0}
+        how["periods"] = max(1, int(np.ceil(t[-1])))
+        ran = self.played_by(motion_from_rest, self.froude, **how)
         states = np.array([np.interp(t, ran.phases, row) for row in ran.states])
-        return motion_with_inertia(checked_mass(chain), self.gait, t, states)
+        return motion_with_inertia(checked_mass(p.body), self.gait, t, states)
 
     def holding(self, motion: SampledMotion) -> np.ndarray:
         """Sticking feet, slower than 3 delta, ``(n_foot, n_time)``; no rows without feet."""

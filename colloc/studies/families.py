@@ -273,14 +273,12 @@ def read_front(table: Path, problem: Problem) -> ParetoFront | None:
 @lru_cache(maxsize=256)
 def _measure(solution: Solution, aims: Objectives) -> np.ndarray:
     """Objectives of a solution and their errors, ``(2, 2)``, from its certificate or a replay."""
-    problem, gait, measured = solution.problem, solution.gait, []
+    problem, measured = solution.problem, []
     for aim in aims:
         period: Period = solution.certificate
         if not set(aim.uses) <= set(period.values):
-            at: Any = (problem.body, problem.law, gait, solution.delta_per_period)
-            period = replayer(problem.regime)(
-                *at, breaks=gait.corner_phases, objective=aim, turn=problem.rotation or 0.0
-            )
+            how: Any = {"objective": aim, "turn": problem.rotation or 0.0}
+            period = solution.played_by(replayer(problem.regime), **how)
         value = aim(period.values)
         measured.append((value, abs(value) * period.error_of(aim)))
     return np.transpose(measured)
