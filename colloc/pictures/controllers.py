@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from colloc.pictures import render
 from colloc.system.arguments import is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
 
@@ -111,21 +112,12 @@ def joint_trajectory(
     speeds: np.ndarray,
 ) -> str:
     """A ``trajectory_msgs/msg/JointTrajectory`` in YAML, from time 0 on."""
-
-    def row(values: np.ndarray) -> str:  # without exponents, which not all readers know
-        return f"[{', '.join(f'{x:.6f}' for x in np.round(values, 6) + 0.0)}]"
-
-    lines = ["# trajectory_msgs/msg/JointTrajectory [rad, rad/s]", *comment_lines(facts)]
-    lines += [f"joint_names: [{', '.join(names)}]", "points:"]
-    clock = np.rint(1e9 * (time - time[0])).astype(int)
-    for nanoseconds, position, velocity in zip(clock.tolist(), angles.T, speeds.T, strict=True):
-        sec, nanosec = divmod(nanoseconds, 10**9)
-        lines += [
-            f"- positions: {row(position)}",
-            f"  velocities: {row(velocity)}",
-            f"  time_from_start: {{sec: {sec}, nanosec: {nanosec}}}",
-        ]
-    return "\n".join(lines) + "\n"
+    # without exponents, which not all readers know
+    rows = ([[f"{x:.6f}" for x in row] for row in np.round(x.T, 6) + 0.0] for x in (angles, speeds))
+    clock = np.rint(1e9 * (time - time[0])).astype(int).tolist()
+    points = zip((divmod(nanoseconds, 10**9) for nanoseconds in clock), *rows, strict=True)
+    comment = "\n".join(comment_lines(facts))
+    return render("trajectory.yaml", comment=comment, names=names, points=points)
 
 
 def c_table(
@@ -134,20 +126,13 @@ def c_table(
     """A C header with samples before time 0, to be sent once, and then those of the cycle: floats
     [rad], or whole pulses. Names begin with that of the file."""
     stem = re.sub(r"\W", "_", path.stem, flags=re.ASCII)
-    stem = f"gait_{stem}" if stem[:1].isdigit() else stem
     kind, number = "float", lambda x: f"{round(x, 7) + 0.0:.7f}f"
     if rows.dtype == int:
         kind, number = "short" if np.abs(rows).max() < 2**15 else "long", str
-    parts = {"ramp": ("once, from straight, at rest", time < 0), "cycle": ("for ever", time >= 0)}
-    parts = {part: each for part, each in parts.items() if each[1].any()}
-    counts = [f"{stem}_{part}_samples = {each[1].sum()}" for part, each in parts.items()]
-    lines = [*comment_lines(facts, "//"), f"#ifndef {stem}_h", f"#define {stem}_h"]
-    lines.append(f"enum {{ {', '.join([f'{stem}_joints = {len(rows)}', *counts])} }};")
-    for name in ("rate_hz", "period_s"):
-        lines.append(f"static const float {stem}_{name} = {facts[name]!r}f;")
-    for part, (how, chosen) in parts.items():
-        lines.append(f"// {', '.join(names)} [{'rad' if kind == 'float' else 'pulses'}], {how}")
-        lines.append(f"static const {kind} {stem}_{part}[{chosen.sum()}][{len(rows)}] = {{")
-        lines += [f"{{{', '.join(map(number, row))}}}," for row in rows.T[chosen]]
-        lines.append("};")
-    return "\n".join([*lines, "#endif"]) + "\n"
+    parts = [("ramp", "once, from straight, at rest", time < 0), ("cycle", "for ever", time >= 0)]
+    tables = [(x, how, [[*map(number, row)] for row in rows.T[at]]) for x, how, at in parts]
+    return render(
+        "table.h", facts=facts, kind=kind, names=names, parts=[each for each in tables if each[2]],
+        stem=f"gait_{stem}" if stem[:1].isdigit() else stem,
+        comment="\n".join(comment_lines(facts, "//")),
+    )  # fmt: skip
