@@ -1,11 +1,13 @@
-"""An inchworm: four links, of which the ends stand on a pair of feet each that slide forwards more
-easily than backwards.
+r"""An inchworm: four links whose ends stand on feet that slide more easily forwards.
 
-The links between are carried. Bending draws the hind feet up while the front ones hold; stretching
-drives the front ones on.
+Bending draws the hind feet up, stretching drives the front ones on. Nothing slides back, so each
+half of the weight is pulled along the way once: the least that friction allows.
+
+$$W = \mu_f \left(\tfrac12 d + \tfrac12 d\right) \;\Rightarrow\; \frac dW = \frac1{\mu_f},
+\qquad \text{if } \mu_f < \mu_b$$
 """
 
-from colloc import Chain, Foot, Friction, Harmonic, Problem
+from colloc import Chain, Foot, Friction, Harmonic, Problem, solve
 
 PROBLEM = Problem(
     name="inchworm",
@@ -17,3 +19,13 @@ PROBLEM = Problem(
     gait=Harmonic(harmonics=1, symmetry="bilateral"),
     joint_limit=1.5,
 )
+
+
+if __name__ == "__main__":
+    solution = solve(PROBLEM)
+    print(solution)
+    print(
+        f"{solution.distance:.4f} body lengths a cycle; the feet hold {solution.share_held} of it"
+    )
+    solution.plot().savefig("inchworm.png")
+    solution.animate("inchworm.gif", periods=1, seconds=3, fps=8, width=640)

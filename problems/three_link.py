@@ -1,14 +1,15 @@
-"""The isotropic three-link crawler, one harmonic, symmetric about angle 1 = -angle 2: the paper's
-best gait.
+r"""Three equal links on a dry floor: the paper's best gait.
 
-    angle 1 =  A0 + A1 cos(2 pi t) + B1 sin(2 pi t)
-    angle 2 = -A0 - A1 cos(2 pi t) + B1 sin(2 pi t)
+Friction is the same in all directions, and no link leaves the floor: each step ahead is paid for by
+links that slide back. The paper finds 0.259 at A0 = 0 (section V, figure 12 D); the guess is
+deliberately poor, a third of that.
 
-Maximise d/W. The paper finds 0.259 at A0 = 0 (section V, figure 12 D). The guess is deliberately
-poor: it does a third of that, with an offset that the optimum does not have.
+$$\int_0^1 \mathbf f\,ds = 0, \quad \int_0^1 \mathbf x \times \mathbf f\,ds = 0,
+\qquad \mathbf f = -\frac{\mathbf v}{|\mathbf v|},
+\qquad q_{1,2} = \pm(A_0 + A_1 \cos 2\pi t) + B_1 \sin 2\pi t$$
 """
 
-from colloc import Friction, Harmonic, Problem, Reference, ellipse
+from colloc import Friction, Harmonic, Problem, Reference, ellipse, solve
 
 PROBLEM = Problem(
     name="three_link",
@@ -24,3 +25,11 @@ REFERENCE = Reference(
     0.0015,
     "S. Alben (2019), section V: 'the global maximum is found at A0 = 0, has efficiency 0.259'",
 )
+
+
+if __name__ == "__main__":
+    solution = solve(PROBLEM)
+    print(solution)
+    print(f"{solution.distance:.4f} body lengths, {solution.work:.4f} weight x length a cycle")
+    solution.plot().savefig("three_link.png")
+    solution.animate("three_link.gif", periods=1, seconds=3, fps=8, width=640)

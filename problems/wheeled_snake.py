@@ -1,12 +1,13 @@
-"""A snake of three equal links on a passive wheel each: it rolls along its links, and hardly slips
-across them.
+r"""Three links on a passive wheel each: they roll along themselves, and hardly slip sideways.
 
-The wheels roll at a fiftieth of the friction that they have sideways. As that ratio falls the
-motion tends to the kinematics of wheels that do not slip at all
+Wheels that never slip would leave no choice: three conditions decide the three velocities of the
+body. Here rolling costs a fiftieth of slipping; as that ratio falls, the motion tends to theirs
 (tests/mechanics/test_floor_contact.py).
+
+$$\mathbf n_i \cdot \mathbf v_i \to 0, \quad i = 1, 2, 3$$
 """
 
-from colloc import Chain, Harmonic, Problem, Wheel
+from colloc import Chain, Harmonic, Problem, Wheel, solve
 
 PROBLEM = Problem(
     name="wheeled_snake",
@@ -16,3 +17,11 @@ PROBLEM = Problem(
     ),
     gait=Harmonic(harmonics=1, symmetry="bilateral"),
 )
+
+
+if __name__ == "__main__":
+    solution = solve(PROBLEM)
+    print(solution)
+    print(f"{solution.distance:.4f} body lengths, {solution.work:.4f} weight x length a cycle")
+    solution.plot().savefig("wheeled_snake.png")
+    solution.animate("wheeled_snake.gif", periods=1, seconds=3, fps=8, width=640)

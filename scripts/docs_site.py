@@ -5,7 +5,7 @@ of docs/.
   docs/developers, are appended under "For developers", so a new file in docs/ needs no other
   change.
 - Generated: the notebook with what it showed, the gallery (problems/ with
-  results/curated/gallery.json), the commands (what --help says), the API.
+  results/curated/gallery.json) and its notebooks, the commands (what --help says), the API.
 - Formulas, ```math blocks and $`inline`$ as on GitHub, become MathML when the site is built:
   readers load no script.
 - Links to what a generated page shows, such as problems/, lead to that page (`SHOWN`). Links to
@@ -29,6 +29,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 from latex2mathml.converter import convert
@@ -45,6 +46,9 @@ ORDER = {
     "Reference": "reference known published limits commands api modules changelog cite",
     "Explanation": "theory collocation search gait_classes bound bodies smooth_bodies",
 }
+GALLERY = """three_link three_link_feet inchworm wheeled_snake serpenoid_snake three_link_fast
+    three_link_uphill three_link_turning smooth_low_mode concertina purcell weakening_floor"""
+"""The problem files that are scripts, in the order of the page."""
 PICTURES = (".png", ".gif")
 KEPT = (*PICTURES, ".md")
 _MATH_BLOCK = re.compile(r"^```math\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -76,9 +80,18 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the generated pages, and the curated pictures and tables."""
+    """Add the generated pages, the notebooks of the gallery, and the curated pictures and
+    tables."""
+    from nbformat import writes
+
+    sys.path.insert(0, str(ROOT))
+    from scripts.notebook import notebook_of
+
     for name, make in GENERATED.items():
         files.append(File.generated(config, name, content=make()))
+    for name in GALLERY.split():
+        notebook = writes(notebook_of(ROOT / f"problems/{name}.py"))
+        files.append(File.generated(config, f"gallery/{name}.ipynb", content=notebook))
     curated = ROOT / "results/curated"
     for path in sorted(path for path in curated.rglob("*") if path.suffix in KEPT):
         name = f"curated/{path.relative_to(curated).as_posix()}"
@@ -138,41 +151,43 @@ def on_post_page(output: str, page: Any, config: Any) -> str:
 
 
 def gallery_page() -> str:
-    """All pictures at a glance, then a section a problem file: its story, picture, numbers and
-    source."""
+    """The films at a glance; of each script its text, numbers, pictures and source; and a row for
+    every other problem file."""
     table = json.loads((ROOT / "results/curated/gallery.json").read_text())
-    files = sorted((ROOT / "problems").glob("[!_]*.py"))
-    shown = [
-        path.stem for path in files if (ROOT / f"results/curated/gallery/{path.stem}.png").exists()
+    films = [
+        f"[![{name}](curated/gallery/{name}.gif){{ width=32% }}](#{name})"
+        for name in GALLERY.split()
     ]
     parts = [
         "# Gallery",
-        "Every file in `problems/`, solved by `python -m scripts.gallery`; `pytest "
-        "tests/commands/test_gallery.py` solves them again and holds them against these numbers. "
-        "Choose a picture for its story.",
-        "\n".join(
-            f"[![{name}](curated/gallery/{name}.png){{ width=49% }}](#{name})" for name in shown
-        ),
+        "Twelve scripts: each states a problem, solves it, prints, and draws a figure and a film, as "
+        "does its notebook. `python -m scripts.gallery` ran them.",
+        "\n".join(films),
     ]
-    for path in files:
-        source = path.read_text(encoding="utf-8")
-        title, _, rest = (ast.get_docstring(ast.parse(source)) or path.stem).partition("\n")
-        parts.append(f"## {path.stem} {{ #{path.stem} }}\n\n**{title}**")
-        if path.stem in shown:
-            parts.append(f"![{path.stem}](curated/gallery/{path.stem}.png)")
-        row = table.get(path.stem)
-        if row and "efficiency" in row:
-            parts.append(
-                "Efficiency **{efficiency:.6f}** ± {error:.0e}: d = {distance:.5f} for W = {work:.5f} "
-                "at δ = {delta:.0e}; {status}, {cpu_seconds:g} s of processor time.".format(**row)
-            )
-        if rest.strip():
-            parts.append(rest.strip("\n"))
-        if "from colloc import" in source and "Problem(" in source:
-            parts.append(f"```sh\ncolloc solve problems/{path.name}\n```")
-        quoted = "\n".join(f"    {line}" for line in source.splitlines())
-        parts.append(f'??? note "source"\n\n    ```python\n{quoted}\n    ```')
-    return "\n\n".join(parts) + "\n"
+    for name in GALLERY.split():
+        title, story, source = _texts(name)
+        parts += [
+            f"## {title} {{ #{name} }}",
+            re.sub(r"\$\$(.*?)\$\$", r"```math\n\1\n```", story, flags=re.DOTALL),
+            f"```sh\npython problems/{name}.py    # {table[name]['cpu_seconds']:.0f} s of processor time\n```",
+            f"```text\n{table[name]['printed'].strip()}\n```",
+            f"![The film of {name}](curated/gallery/{name}.gif)",
+            f"![The figure of {name}](curated/gallery/{name}.png)",
+            f'[As a notebook](gallery/{name}.ipynb).\n\n??? note "problems/{name}.py"\n\n'
+            + indent(f"```python\n{source}\n```", "    "),
+        ]
+    rows = ["| `colloc solve problems/` | d/W |", "|---|---|"]
+    for path in sorted((ROOT / "problems").glob("[!_]*.py")):
+        if path.stem not in GALLERY.split():
+            rows.append(f"| {path.name} | {table[path.stem]['efficiency']:.5g} |")
+    return "\n\n".join([*parts, "## More problem files", "\n".join(rows)]) + "\n"
+
+
+def _texts(name: str) -> tuple[str, str, str]:
+    """Title and story of a problem file, and its source without them."""
+    source = (ROOT / f"problems/{name}.py").read_text(encoding="utf-8")
+    title, _, story = (ast.get_docstring(ast.parse(source)) or name).partition("\n\n")
+    return " ".join(title.split()).rstrip("."), story, source.split('"""', 2)[2].strip()
 
 
 def root_page(name: str) -> str:

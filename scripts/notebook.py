@@ -7,7 +7,9 @@ without a change of results changes the file little.
 
 from __future__ import annotations
 
+import ast
 import tempfile
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,23 @@ from scripts.program import command_line
 
 NOTEBOOK = Path(__file__).resolve().parents[1] / "docs/notebook.ipynb"
 _SECONDS = 300
+
+
+def notebook_of(script: Path) -> Any:
+    """The notebook of a problem file that is a script: its text, the statement, the run, and the
+    figure and film that it wrote."""
+    from nbformat import v4
+
+    source = script.read_text(encoding="utf-8")
+    lines, module = source.splitlines(), ast.parse(source)
+    title, _, story = (ast.get_docstring(module) or "").partition("\n")
+    _, first, *_, main = module.body
+    stated = "\n".join(lines[first.lineno - 1 : main.lineno - 1])
+    run = textwrap.dedent("\n".join(lines[main.lineno :]))
+    shown = [f'Image("{script.stem}.{kind}")' for kind in ("png", "gif")]
+    code = [stated, run, f"from IPython.display import Image\n\n{shown[0]}", shown[1]]
+    cells = [v4.new_markdown_cell(f"# {title}\n{story}")]
+    return _tidy(v4.new_notebook(cells=cells + [v4.new_code_cell(cell.strip()) for cell in code]))
 
 
 def executed(path: Path, folder: Path) -> Any:
@@ -29,6 +48,10 @@ def executed(path: Path, folder: Path) -> Any:
         "resources": {"metadata": {"path": str(folder)}},
     }
     NotebookClient(notebook, **options).execute()
+    return _tidy(notebook)
+
+
+def _tidy(notebook: Any) -> Any:
     for number, cell in enumerate(notebook.cells):
         cell["id"] = f"cell-{number}"
         cell.metadata.clear()

@@ -11,6 +11,7 @@ pytest.importorskip("mkdocs")
 pytest.importorskip("latex2mathml")
 from scripts import docs_site
 from scripts.browser import browser, complaints
+from scripts.notebook import executed, notebook_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -46,6 +47,21 @@ def shown(markdown, page="tutorial.md"):
 )
 def test_a_link_of_the_repository_leads_to_the_page_that_shows_it(link, page, becomes):
     assert shown(link, page) == becomes
+
+
+@pytest.mark.slow
+def test_the_notebook_of_a_script_prints_and_shows_what_the_script_does(tmp_path):
+    nbformat = pytest.importorskip("nbformat")
+    pytest.importorskip("nbclient")
+    path = tmp_path / "three_link.ipynb"
+    nbformat.write(notebook_of(ROOT / "problems/three_link.py"), path)
+    run = executed(path, tmp_path)
+    printed, *shown = [output for cell in run.cells[2:] for output in cell["outputs"]]
+    assert "<Solution three_link, solved, d/W = 0.26003" in printed["text"]
+    assert [kind for output in shown for kind in output["data"] if "image" in kind] == [
+        "image/png",
+        "image/gif",
+    ]
 
 
 @pytest.fixture
