@@ -212,7 +212,7 @@ class LinearClass:
         return np.zeros((n_joint, 1)) if joint_map is None else joint_map.offset
 
     def member(self, parameters: np.ndarray, n_joint: int) -> Any:
-        return Combination(self, (self._basis(n_joint) @ parameters).reshape(n_joint, -1))
+        return Combination(self, self.table(parameters, n_joint))
 
     def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
         """The gait in the time of a program, in which angles are linear in the parameters."""
@@ -223,6 +223,17 @@ class LinearClass:
         functions = self.functions(t, derivative)
         basis = self._basis(n_joint).reshape(n_joint, functions.shape[0], -1)
         return np.einsum("wt,jwp->tjp", functions, basis)
+
+    def table(self, parameters: np.ndarray, n_joint: int) -> np.ndarray:
+        """T of a gait, ``(n_joint, n_function)``."""
+        return (self._basis(n_joint) @ parameters).reshape(n_joint, -1)
+
+    def pull_back(self, on_angles: np.ndarray, functions: np.ndarray) -> np.ndarray:
+        """Derivatives along the parameters ``(n_time, n_parameter)``, from those along angles
+        ``(n_joint, n_time)`` that are ``T functions``."""
+        basis = self._basis(len(on_angles))
+        on_tables = on_angles.T[:, :, None] * functions.T[:, None]
+        return on_tables.reshape(-1, len(basis)) @ basis
 
     def rates_on(self, mesh: Mesh, n_joint: int) -> np.ndarray:
         """Joint rates per parameter at the points of a mesh, at corners that of the interval."""

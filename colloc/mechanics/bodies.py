@@ -46,11 +46,11 @@ class Defaults(NamedTuple):
 
 class Stretch(NamedTuple):
     """An interval of a smooth body's arc length, and the tangent angles at places on it per shape
-    coordinate, ``(n, n_joint)``; for CasADi at one place."""
+    coordinate, ``(n, n_joint)``."""
 
     first: float
     last: float
-    angles_at: Callable[[Array], Array]
+    angles_at: Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)

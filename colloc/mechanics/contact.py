@@ -59,110 +59,164 @@ def tangent_of_minimum(
     return share * first + share_of_second * second + width * bulge
 
 
+def held_minimum(first: Array, second: Array, share: Array, width: float) -> Array:
+    """`smooth_minimum`, or its tangent plane of a given share where that is not negative."""
+    xp = namespace(share, first)
+    plane = tangent_of_minimum(first, second, 0.5 * (share + xp.abs(share)), width)
+    return xp.where(share < 0, smooth_minimum(first, second, width), plane)
+
+
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Two parts that must not cross: the smaller of two functions of shapes ``(n_joint, n_time)``,
-    ``(1, n_time)`` each, must not be positive; it is smoothed over `width`. NumPy and CasADi."""
+    """Two parts that must not cross: the smaller of two values of one function of the joint angles
+    between them must not be positive; it is smoothed over `width`. NumPy and CasADi.
+
+    joints: those between the parts. order: the joints among these as each of the two values takes
+    them, ``(2, k)``. numbers: what else it takes, ``(2, m)``. function: angles ``(k, n_time)`` and
+    numbers ``(m, n_time)`` to values ``(1, n_time)``. slopes: to derivatives ``(k, n_time)``.
+    """
 
     name: str
-    pair: Callable[[Array], tuple[Array, Array]]
+    joints: range
+    order: np.ndarray
+    numbers: np.ndarray
+    function: Callable[[Array, Array], Array]
+    slopes: Callable[[np.ndarray, np.ndarray], np.ndarray]
     width: float
+
+    def pair(self, angles: Array) -> tuple[Array, Array]:
+        """Both values ``(1, n_time)``, at all angles of a body."""
+        return self._values(angles[list(self.joints), :])
+
+    def _values(self, angles: Array) -> tuple[Array, Array]:
+        first, second = (
+            self.function(angles[order.tolist(), :], namespace(angles).constant(numbers[:, None]))
+            for order, numbers in zip(self.order, self.numbers, strict=True)
+        )
+        return first, second
+
+    def held(self, angles: Array, share: Array) -> Array:
+        """The minimum, or its tangent plane, at the angles between the parts."""
+        return held_minimum(*self._values(angles), share, self.width)
 
     def excess(self, angles: Array) -> Array:
         """The smoothed minimum ``(1, n_time)``."""
         return smooth_minimum(*self.pair(angles), self.width)
 
 
-# smooth functions of joint angles, for programs
+# smooth functions of joint angles, for programs, and their derivatives
 
 
 def near_contacts(body: Any) -> list[Contact]:
     """Links two apart, bending to either side."""
-
-    def contact(i: int, side: str, sign: int) -> Contact:
-        def pair(angles: Array) -> tuple[Array, Array]:
-            first, second = crossing_sums(body, angles, i)
-            return sign * first - np.pi, sign * second - np.pi
-
-        return Contact(f"links {i + 1} and {i + 3} ({side})", pair, SMOOTHING)
-
-    sides = ("left", 1), ("right", -1)
-    return [contact(i, *side) for i in range(body.n_link - 2) for side in sides]
+    contacts, there_and_back = [], np.array([[0, 1], [1, 0]])
+    for i in range(body.n_link - 2):
+        before, middle, after = body.lengths[i : i + 3]
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            name = f"links {i + 1} and {i + 3} ({side})"
+            numbers = np.array([[sign, before, middle], [sign, after, middle]])
+            at = range(i, i + 2), there_and_back, numbers
+            contacts.append(Contact(name, *at, _crossing_sum, _slopes_of_sum, SMOOTHING))
+    return contacts
 
 
 def link_contacts(body: Any, far: Sequence[Pair] = ()) -> list[Contact]:
     """Links two apart, the pairs `far` of links farther apart, and all ends and links if the links
     are wide."""
-
-    def crossing(i: int, j: int) -> Contact:
-        name = f"links {i + 1} and {j + 1}"
-        return Contact(name, lambda angles: intrusions(body, angles, i, j), CLEARANCE_SMOOTHING)
-
-    def nearing(end: int, link: int) -> Contact:
-        # one condition alone is the smaller of two that are the same
-        name = f"end {end} and link {link + 1}"
-        return Contact(
-            name, lambda angles: (lacking_width(body, angles, end, link),) * 2, CLEARANCE_SMOOTHING
-        )
-
-    wide = [nearing(*pair) for pair in ends_and_links(body)] if body.width else []
-    return near_contacts(body) + [crossing(*pair) for pair in far] + wide
+    wide = [lacking_width(body, *pair) for pair in ends_and_links(body)] if body.width else []
+    return near_contacts(body) + [far_contact(body, *pair) for pair in far] + wide
 
 
-def crossing_sums(body: Any, angles: Array, i: int) -> tuple[Array, Array]:
-    """Two sums ``(1, n_time)`` that both exceed pi, or both fall below -pi, where links i and i + 2
-    cross."""
-    before, middle, after = body.lengths[i : i + 3]
-    xp, a, b = namespace(angles), angles[i : i + 1, :], angles[i + 1 : i + 2, :]
-
-    def chi(angle: Array, link: float) -> Array:
-        if link == middle:
-            return 0.5 * angle
-        return xp.arctan2(link * xp.sin(angle), middle + link * xp.cos(angle))
-
-    return b + chi(a, before), a + chi(b, after)
+def _crossing_sum(angles: Array, numbers: Array) -> Array:
+    """A sum of the angles a, b between links two apart that exceeds pi, as that of the angles the
+    other way round does, where the links cross; over pi, and to either side."""
+    xp, a, b = namespace(angles), angles[:1, :], angles[1:, :]
+    side, link, middle = (numbers[k : k + 1, :] for k in range(3))
+    chi = xp.arctan2(link * xp.sin(a), middle + link * xp.cos(a))
+    return side * (b + xp.where(link == middle, 0.5 * a, chi)) - np.pi
 
 
-def intrusions(body: Any, angles: Array, first: int, second: int) -> tuple[Array, Array]:
-    """Two smooth functions ``(1, n_time)`` that are both > 0 where links `first` < `second` cross
-    [body lengths].
+def _slopes_of_sum(angles: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    side, link, middle = numbers
+    along = link * np.cos(angles[0])
+    bend = link * link + middle * along
+    square = np.where(link == middle, 1.0, bend + middle * (middle + along))
+    return side * np.stack([np.where(link == middle, 0.5, bend / square), np.ones_like(bend)])
 
-    With m and d the mean and half the difference of the distances of one link's ends from the
-    other's line, that link lies on one side iff ``|d| - |m| <= 0``. Smoothing also closes the gap
-    through which parallel links would slip through each other when both ends pass at once.
+
+def far_contact(body: Any, first: int, second: int) -> Contact:
+    """Both values are > 0 where links `first` < `second`, more than one apart, cross [body
+    lengths]."""
+    joints, name = range(first, second), f"links {first + 1} and {second + 1}"
+    order = np.array([joints, joints[::-1]]) - first
+    lengths = np.array([body.lengths[first + 1 : second + 1], body.lengths[first:second][::-1]])
+    return Contact(
+        name, joints, order, lengths, _straddling, _slopes_of_straddling, CLEARANCE_SMOOTHING
+    )
+
+
+def _straddling(angles: Array, lengths: Array) -> Array:
+    """What is > 0 where a link has its ends on both sides of another's line, from the angles and
+    lengths on the way from there to its farther end.
+
+    With m and d the mean and half the difference of the distances of its ends from the line, it
+    lies on one side iff ``|d| - |m| <= 0``. Smoothing also closes the gap through which parallel
+    links would slip through each other when both ends pass at once.
     """
-
-    def straddling(line: int, link: int) -> Array:
-        a, b = (_seen_from(body, angles, line, end)[1] for end in (link, link + 1))
-        square, spread = (0.5 * (a + b)) ** 2, (0.5 * (a - b)) ** 2
-        xp, smoothing = namespace(angles), CLEARANCE_SMOOTHING**2
-        # never above |m|, and below it by at most 0.3 of the smoothing
-        return xp.sqrt(spread + smoothing) - square / xp.sqrt(square + smoothing)
-
-    return straddling(first, second), straddling(second, first)
+    xp, smoothing = namespace(angles), CLEARANCE_SMOOTHING**2
+    heights = lengths * xp.sin(xp.cumsum(angles))
+    half = 0.5 * heights[-1:, :]
+    square = (xp.sum_rows(heights) - half) ** 2
+    # never above |m|, and below it by at most 0.3 of the smoothing
+    return xp.sqrt(half**2 + smoothing) - square / xp.sqrt(square + smoothing)
 
 
-def lacking_width(body: Any, angles: Array, end: int, link: int) -> Array:
+def _slopes_of_straddling(angles: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    turn, smoothing = np.cumsum(angles, axis=0), CLEARANCE_SMOOTHING**2
+    heights, along = lengths * np.sin(turn), lengths * np.cos(turn)
+    half = 0.5 * heights[-1]
+    mean = heights.sum(axis=0) - half
+    square = mean * mean + smoothing
+    on_mean = -mean * (square + smoothing) / (square * np.sqrt(square))
+    on_half = half / np.sqrt(half * half + smoothing) - on_mean
+    return on_mean * _ahead(along) + on_half * 0.5 * along[-1]
+
+
+def _ahead(rows: np.ndarray) -> np.ndarray:
+    """Sums of each row and those after it: a joint carries all links beyond it."""
+    return np.cumsum(rows[::-1], axis=0)[::-1]
+
+
+def lacking_width(body: Any, end: int, link: int) -> Contact:
     """The width w that an end and a link at the distance d lack to first order, ``(w^2 - d^2)/2w``
-    [body lengths], ``(1, n_time)``: unlike the distance it has a derivative on the link."""
-    xp, w, length = namespace(angles), body.width, body.lengths[link]
-    along, across = _seen_from(body, angles, link, end)
-    # `along` is counted from the near end into the link: what lies outside of [0, length]
-    outside = 0.5 * (along - xp.abs(along)) + 0.5 * (along - length + xp.abs(along - length))
-    return (w * w - (outside * outside + across * across)) / (2 * w)
+    [body lengths]: unlike the distance it has a derivative on the link."""
+    between = range(link + 1, end) if end > link else range(link - 1, end - 1, -1)
+    joints = range(link, end - 1) if end > link else range(end, link)
+    order = np.arange(len(joints))[:: 1 if end > link else -1]
+    numbers = np.array([body.width, body.lengths[link], *(body.lengths[k] for k in between)])
+    both = np.tile(order, (2, 1)), np.tile(numbers, (2, 1))  # one condition alone
+    name = f"end {end} and link {link + 1}"
+    return Contact(name, joints, *both, _lacking, _slopes_of_lacking, CLEARANCE_SMOOTHING)
 
 
-def _seen_from(body: Any, angles: Array, link: int, end: int) -> tuple[Array, Array]:
-    """The joint or tip number `end` in the frame of a link: from its end that is nearer along the
-    chain, into the link and across, ``(1, n_time)`` each."""
-    xp, forwards = namespace(angles), end > link
-    along, across, turn = 0.0, 0.0, 0.0
-    for k in range(link + 1, end) if forwards else range(link - 1, end - 1, -1):
-        joint = k - 1 if forwards else k
-        turn = turn + angles[joint : joint + 1, :]
-        along = along - body.lengths[k] * xp.cos(turn)
-        across = across + body.lengths[k] * xp.sin(turn)
-    return along, across
+def _outside(xp: Any, along: Array, length: Array) -> Array:
+    """What lies outside of [0, length]."""
+    return 0.5 * (along - xp.abs(along)) + 0.5 * (along - length + xp.abs(along - length))
+
+
+def _lacking(angles: Array, numbers: Array) -> Array:
+    xp, w, length, lengths = namespace(angles), numbers[:1, :], numbers[1:2, :], numbers[2:, :]
+    turn = xp.cumsum(angles)
+    # from the end of the link that is nearer along the chain, into the link and across
+    along, across = -xp.sum_rows(lengths * xp.cos(turn)), xp.sum_rows(lengths * xp.sin(turn))
+    return (w * w - (_outside(xp, along, length) ** 2 + across**2)) / (2 * w)
+
+
+def _slopes_of_lacking(angles: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    (w, length), lengths, turn = numbers[:2], numbers[2:], np.cumsum(angles, axis=0)
+    x, y = lengths * np.cos(turn), lengths * np.sin(turn)
+    outside = _outside(np, -x.sum(axis=0), length)  # where it is none its slope does not count
+    return -(outside * _ahead(y) + y.sum(axis=0) * _ahead(x)) / w
 
 
 def ends_and_links(body: Any) -> list[Pair]:

@@ -22,9 +22,10 @@ _NUMPY = SimpleNamespace(
     abs=np.abs,
     arctan2=np.arctan2,
     matmul=operator.matmul,
+    constant=np.asarray,
+    cumsum=lambda a: np.cumsum(a, axis=0),
     sum_rows=lambda a: np.sum(a, axis=0, keepdims=True),
     stack=lambda rows: np.concatenate(rows, axis=0),
-    columns=lambda entries: np.stack(entries, axis=-1),
 )
 
 
@@ -39,9 +40,10 @@ def _casadi() -> SimpleNamespace:
         abs=casadi.fabs,
         arctan2=casadi.atan2,
         matmul=lambda a, b: casadi.mtimes(casadi.DM(a), b),
+        constant=casadi.DM,
+        cumsum=casadi.cumsum,
         sum_rows=casadi.sum1,
         stack=lambda rows: casadi.vertcat(*rows),
-        columns=lambda entries: casadi.horzcat(*entries),
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -15,14 +14,7 @@ from colloc.mechanics.contact import Pairs
 from colloc.numerics.sqp import keep_last
 from colloc.reduced.motion import ReducedMotion
 from colloc.reduced.program import Constraints, SearchSpace
-from colloc.transcription.shape_constraints import (
-    Placed,
-    following_instants,
-    moving,
-    near_peaks,
-    shape_checks,
-    shape_support,
-)
+from colloc.transcription.shape_constraints import Placed, near_peaks, shape_checks
 
 _TURNS = 0.25 * np.pi * np.array([0, 1, -1, 2, -2, 3, -3])
 """Turns [rad] of the initial heading tried where the body slides down."""
@@ -45,7 +37,6 @@ class LinearSpace(SearchSpace):
         speeds, joint_map = control.admissible.largest_speeds, control.dynamics.joint_map
         self.checks = shape_checks(control.dynamics.body, far, speeds, joint_map)
         self._offset = self._gaits.offset(n_joint)
-        self._support = shape_support(self._gaits, self.mesh, n_joint)
         angles = self._gaits.angle_matrix(self.mesh.times, n_joint)
         self._matrix = np.concatenate([angles, self._gaits.rates_on(self.mesh, n_joint)], axis=1)
         self._pace = np.ones(self.mesh.n_point)
@@ -61,7 +52,7 @@ class LinearSpace(SearchSpace):
             self.own = np.delete(self.own, slice(self._gaits.n_wave, lower.size - self._n_static))
         self.lower, self.upper = lower[self.own], upper[self.own]
         self._peaks = keep_last(
-            lambda v: near_peaks(self.trajectory(v), self.mesh, self.checks, self._limit)
+            lambda v: near_peaks(self._gaits, self._table(v), self.mesh, self.checks, self._limit)
         )
 
     def shape(self, v: np.ndarray) -> np.ndarray:
@@ -77,6 +68,9 @@ class LinearSpace(SearchSpace):
             on_shape = on_shape @ np.vstack([np.eye(own.size), slopes])
         none = np.zeros((len(on_shape), self._n_static))
         return np.concatenate([on_shape, none], axis=1) if self._n_static else on_shape
+
+    def _table(self, v: np.ndarray) -> np.ndarray:
+        return self._gaits.table(self.shape(v), len(self._offset))
 
     def full_parameters(self, v: np.ndarray) -> np.ndarray:
         return np.append(self.shape(v), v[self.n - self._n_static :])
@@ -129,39 +123,46 @@ class LinearSpace(SearchSpace):
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """Shape constraints at their worst instants in cells where they might bind, then the square
         of the shape speed."""
-        gait, limit, placed = self.trajectory(v), self._limit, list[tuple[Placed, np.ndarray]]()
-        kinds, low, high, excess = dict[str, np.ndarray](), [], [], -np.inf
-        for check, (cells, times) in zip(self.checks, self._peaks(v), strict=True):
-            kinds[check.name] = cells
-            if not cells.size:
-                continue
-            times = times + later * self.mesh.h[cells]
-            each = Placed.at(check, cells, times, self._gaits, gait, self._support)
-            values = check.along(check.of(gait, times))
-            placed.append((each, moving(each, values, limit, self.mesh)))
-            excess = max(excess, float(check.excess(values, limit).max()))
-            lower, upper = check.nearer_bounds(values, limit)
-            low.append(lower)
-            high.append(upper)
-        kinds["shape speed"] = np.zeros(1, dtype=int)
-        lower = np.concatenate([*low, [self.control.admissible.smallest_shape_speed**2]])
-        upper = np.concatenate([*high, [np.inf]])
+        gaits, checks, mesh = self._gaits, self.checks, self.mesh
+        which, cells, times = self._peaks(v)
+        times = times + later * mesh.h[cells]
+        shapes = checks.shapes(gaits, self._table(v), which, times)
+        placed = Placed(checks, which, cells, times, checks.shares(which, shapes))
+        values = checks.values(which, shapes)
+        lower, upper = (each[which] for each in checks.bounds(self._limit))
+        above, below = values - upper, lower - values
+        excess, is_below = np.maximum(above, below), below > above
+        lower, upper = np.where(is_below, lower, -np.inf), np.where(is_below, np.inf, upper)
+        lower = np.append(lower, self.control.admissible.smallest_shape_speed**2)
+        kinds = placed.cells_of | {"shape speed": np.zeros(1, dtype=int)}
+        moving = placed.moving(excess, mesh)
+        rest = self._offset * (which < checks.n_shape)
+        functions = checks.functions(gaits, which, times)
 
-        def rows(placed_at: Callable[[np.ndarray], list[Placed]]) -> Constraints:
+        @keep_last
+        def at_worst(v: np.ndarray) -> np.ndarray:
+            found = functions.copy()
+            worst = placed.follow(moving, gaits, self._table(v), mesh, self._limit)
+            found[:, moving] = checks.functions(gaits, which[moving], worst)
+            return found
+
+        def rows(functions_at: Callable[[np.ndarray], np.ndarray]) -> Constraints:
+            def shapes(v: np.ndarray) -> np.ndarray:
+                return np.asarray(self._table(v) @ functions_at(v) + rest)
+
             def values(v: np.ndarray) -> np.ndarray:
-                shapes = (each.value(self.shape(v)) for each in placed_at(v))
-                return np.concatenate([*shapes, [self._square_of_speed(v)[0]]])
+                found = checks.values(which, shapes(v), placed.shares)
+                return np.append(found, self._square_of_speed(v)[0])
 
             def slopes(v: np.ndarray) -> np.ndarray:
-                shapes = (each.slope(self.shape(v)) for each in placed_at(v))
-                return self.shape_vjp(v, np.vstack([*shapes, self._square_of_speed(v)[1]]))
+                on_shapes = checks.slopes(which, shapes(v), placed.shares)
+                found = gaits.pull_back(on_shapes, functions_at(v))
+                return self.shape_vjp(v, np.vstack([found, self._square_of_speed(v)[1]]))
 
-            return Constraints(kinds, lower, upper, excess, values, slopes)
+            most = float(excess.max(initial=-np.inf))
+            return Constraints(kinds, lower, np.append(upper, np.inf), most, values, slopes)
 
-        at_worst = keep_last(partial(self._at_worst, placed))
-        return rows(lambda v: [each for each, _ in placed])._replace(
-            following=lambda: rows(at_worst)
-        )
+        return rows(lambda v: functions)._replace(following=lambda: rows(at_worst))
 
     def _square_of_speed(self, v: np.ndarray) -> tuple[float, np.ndarray]:
         """Square of the root-mean-square shape speed [rad per radian of phase], or of the mean one
@@ -174,13 +175,3 @@ class LinearSpace(SearchSpace):
         mean, unit = float(self._sides @ speeds), rates / speeds[:, None]
         slope = np.einsum("k,kj,kjp->p", self._sides, unit, self._side_rates)
         return mean**2, 2 * mean * slope
-
-    def _at_worst(self, placed: list[tuple[Placed, np.ndarray]], v: np.ndarray) -> list[Placed]:
-        """Constraints at the worst instants of v in the cells where they were placed."""
-        gait, found = self.trajectory(v), []
-        for each, which in placed:
-            if which.size:
-                worst = following_instants(each, which, gait, self.mesh, self._limit)
-                each = each.move(which, worst, self._gaits)
-            found.append(each)
-        return found

@@ -74,17 +74,16 @@ class ModalBody(SmoothBody):
     def grid(self) -> PanelGrid:
         return PanelGrid(np.linspace(0.0, 1.0, self.panels + 1)[:, None], self.order)
 
-    def modes_at(self, s: Array) -> Array:
-        """Modes at arc lengths s, ``(*s.shape, modes)``; for CasADi at one, ``(1, modes)``."""
-        xp = namespace(s)
+    def modes_at(self, s: np.ndarray) -> np.ndarray:
+        """Modes at arc lengths s, ``(*s.shape, modes)``."""
         if self.basis == LEGENDRE:
             x = 2 * s - 1
-            modes = [1.0, x]
+            modes = [np.ones_like(x), x]
             for k in range(1, self.modes):
                 modes.append(((2 * k + 1) * x * modes[k] - k * modes[k - 1]) / (k + 1))
-            return xp.columns(modes[1:])
+            return np.stack(modes[1:], axis=-1)
         waves = [2 * np.pi * k * s for k in range(1, self.modes // 2 + 1)]
-        return xp.columns([wave(x) for x in waves for wave in (xp.sin, xp.cos)])
+        return np.stack([wave(x) for x in waves for wave in (np.sin, np.cos)], axis=-1)
 
     @property
     def reversal(self) -> np.ndarray:

@@ -8,28 +8,23 @@ by nested sampling.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 from scipy import sparse
 
 from colloc.dynamics.control_problem import ControlProblem
-from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import Limit, range_of
-from colloc.mechanics.bodies import Body, Stretch
+from colloc.mechanics.bodies import Body
 from colloc.mechanics.contact import (
     Contact,
     Pairs,
+    held_minimum,
     share_of_first,
     smooth_minimum,
-    tangent_of_minimum,
 )
 from colloc.mechanics.densities import JointMap
-from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, peaks, vertex
 from colloc.numerics.repeated import Program
@@ -40,127 +35,161 @@ _PLACES, _FLAT = 9, 1e-12
 _NEAR, _FAR = 0.1, 1.0
 """Distances from the bound [rad] below which a cell, or a peak, is watched."""
 _HELD_SHARE, _HELD_NEAR = 1e-3, 0.05
-"""A check is replaced by its tangent plane where both sums have at least this share in it and it is
-this near to its bound [rad]: elsewhere the gait may move far."""
+"""A contact is replaced by its tangent plane where both values have at least this share in it and
+it is this near to its bound [rad]: elsewhere the gait may move far."""
 _STEP, _LARGEST, _STEPS = 1e-3, 0.1, 4
 """Sampling and largest step of Newton's method, as parts of a cell; number of steps."""
+_BLOCK = 4000  # values at once, which stay in the cache
 
 
-@dataclass(frozen=True, eq=False)
-class ShapeCheck:
-    """A scalar function of the shape, or of its rates, between bounds.
+class Contacts(NamedTuple):
+    """Contacts of one function, side by side: joints ``(k, 2, n)`` and numbers ``(m, 2, n)`` of
+    both values, after zeros for links that are less far apart."""
 
-    along: its values ``(n_time,)`` at shapes ``(n_joint, n_time)``. share: there, if it is the
-    minimum of two functions whose tangent plane shall stand for it, the weight of the first, else
-    -1; of the largest angle on a stretch of a smooth body, where on the body it is. cut: of shapes
-    and shares ``(n_time,)``, or CasADi's for one, these planes, the function itself where shares
-    are negative, or the angles at these places, ``(1, n_time)``. slope: its derivative with respect
-    to the shape. row: it per shape coordinate, if it is linear. place: which of the body's angles
-    it is, -1 if it is none. fixed: its bounds, if these are not the limits of such an angle.
-    derivative: 1 if "shapes" are their rates per period.
+    like: Contact
+    joints: np.ndarray
+    numbers: np.ndarray
+
+    def pair(self, which: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Both values ``(2, n_time)``; angles and numbers that they take."""
+        joints, numbers = self.joints[:, :, which], self.numbers[:, :, which]
+        taken = angles[joints, np.arange(which.size)].reshape(len(joints), -1)
+        numbers = numbers.reshape(len(numbers), -1)
+        return self.like.function(taken, numbers).reshape(2, -1), taken, numbers
+
+
+class ShapeChecks:
+    """Functions of the shape, or of its rates, between bounds, one after the other by `names`:
+    angles within the limit, contacts, and rates over the largest allowed, `speeds` [rad per
+    period]. They are evaluated for many instants at once, `which` ``(n,)`` each, with a column of
+    shapes ``(n_joint, n)``, or of rates per period, for each.
+
+    shares ``(n,)``: of a contact, if the tangent plane of a minimum stands for it, the weight of
+    the first value, else -1; of the largest angle on a stretch of a smooth body, where that is.
     """
 
-    name: str
-    along: Callable[[np.ndarray], np.ndarray]
-    share: Callable[[np.ndarray], np.ndarray]
-    cut: Callable[[Array, Array], Array]
-    slope: ca.Function
-    row: np.ndarray | None = None
-    place: int = -1
-    fixed: tuple[float, float] | None = None
-    derivative: int = 0
+    def __init__(
+        self, body: Body, far: Pairs, speeds: tuple[float, ...], joint_map: JointMap | None
+    ) -> None:
+        bounded, motors, motor = body.bounded_angles, np.eye(body.n_joint), body.defaults.coordinate
+        if joint_map:
+            motors, motor = joint_map.inverse, "motor"
+        self._stretches, self.contacts = bounded.stretches, body.contacts(far)
+        self.n_angle = len(bounded.names)
+        self.n_shape = self.n_angle + len(self.contacts)
+        rates = (f"speed of {motor} {j + 1}" for j in range(len(speeds)))
+        self.names = [*bounded.names, *(each.name for each in self.contacts), *rates]
+        # those that are linear
+        self.rows = np.zeros((len(self.names), body.n_joint))
+        self.rows[: self.n_angle] = 0.0 if self._stretches else bounded.rows
+        self.rows[self.n_shape :] = motors[: len(speeds)] / np.reshape(speeds, (-1, 1))
+        self._groups, self._group = list[Contacts](), np.full(len(self.names), -1)
+        self._place = np.zeros(len(self.names), dtype=int)
+        for function in dict.fromkeys(each.function for each in self.contacts):
+            of = [k for k, each in enumerate(self.contacts) if each.function is function]
+            at = self.n_angle + np.array(of)
+            self._group[at], self._place[at] = len(self._groups), np.arange(at.size)
+            self._groups.append(_side_by_side([self.contacts[k] for k in of], body.n_joint))
 
-    def bounds(self, limit: Limit) -> tuple[float, float]:
-        return self.fixed or range_of(limit[self.place] if isinstance(limit, tuple) else limit)
+    def bounds(self, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
+        angles = limit if isinstance(limit, tuple) else (limit,) * self.n_angle
+        n_rate = len(self.names) - self.n_shape
+        each = [*map(range_of, angles), *[(-np.inf, 0.0)] * len(self.contacts)]
+        lower, upper = np.array([*each, *[(-1.0, 1.0)] * n_rate]).reshape(-1, 2).T
+        return lower, upper
 
-    def excess(self, values: np.ndarray, limit: Limit) -> np.ndarray:
-        lower, upper = self.bounds(limit)
-        return np.maximum(values - upper, lower - values)
+    def functions(self, gaits: Any, which: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Functions of a class ``(n_function, n)``, or derivatives, of which shapes are sums."""
+        found, rates = np.array(gaits.functions(times)), which >= self.n_shape
+        if rates.any():
+            found[:, rates] = gaits.functions(times[rates], 1)
+        return found
 
-    def nearer_bounds(self, values: np.ndarray, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
-        """The nearer bound of values ``(n,)``; infinite in place of the other."""
-        lower, upper = self.bounds(limit)
-        below = values - lower < upper - values
-        return np.where(below, lower, -np.inf), np.where(below, np.inf, upper)
-
-    def of(self, gait: Any, times: np.ndarray) -> np.ndarray:
-        """Shapes of a gait, or their rates, ``(n_joint, n_time)``."""
-        return np.asarray(gait.rates(times) if self.derivative else gait.angles(times))
-
-    @cached_property
-    def joints(self) -> list[int]:
-        """Shape coordinates it depends on."""
-        return [int(k) for k in self.slope.sparsity_out(0).row()]
-
-    def matrix(
-        self, gaits: Any, times: np.ndarray, n_joint: int, columns: np.ndarray
+    def shapes(
+        self, gaits: Any, table: np.ndarray, which: np.ndarray, times: np.ndarray
     ) -> np.ndarray:
-        """Some parameters of a class to its shapes, or their rates, ``(n_time, k, m)``."""
-        matrix = gaits.angle_matrix(times, n_joint, self.derivative)
-        return np.asarray(matrix[:, self.joints][:, :, columns])
+        """Of the gait with a table."""
+        rest = gaits.offset(len(table)) * (which < self.n_shape)
+        return np.asarray(table @ self.functions(gaits, which, times) + rest)
+
+    def fresh_shares(self, which: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+        shares = np.full(which.size, -1.0)
+        on_stretch = which < self.n_angle if self._stretches else np.zeros(which.size, bool)
+        for k in np.unique(which[on_stretch]):
+            shares[which == k] = self._largest(int(k), shapes[:, which == k])
+        return shares
+
+    def shares(self, which: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+        """Shares that are held as the gait moves."""
+        shares = self.fresh_shares(which, shapes)
+        for here, group, (first, second), *_ in self._contacts_at(which, shapes):
+            width = group.like.width
+            of_first = share_of_first(first, second, width)
+            near = smooth_minimum(first, second, width) > -_HELD_NEAR
+            both = near & (np.abs(of_first - 0.5) < 0.5 - _HELD_SHARE)
+            shares[here] = np.where(both, of_first, -1.0)
+        return shares
+
+    def _largest(self, k: int, shapes: np.ndarray) -> np.ndarray:
+        """Place of the largest angle on a stretch ``(n,)``, by a parabola."""
+        first, last, angles_at = self._stretches[k]
+        fine = np.linspace(first, last, _PLACES)
+        heights = np.abs(angles_at(fine) @ shapes)
+        inner = np.clip(np.argmax(heights, axis=0), 1, _PLACES - 2)
+        every = np.arange(heights.shape[1])
+        low, mid, high = (heights[inner + k, every] for k in (-1, 0, 1))
+        bent = low - 2 * mid + high < -_FLAT
+        offset = np.where(bent, vertex(low, mid, high), np.sign(high - low))
+        return fine[inner] + np.clip(offset, -1, 1) * (fine[1] - fine[0])
+
+    def linear_rows(self, which: np.ndarray, shares: np.ndarray) -> np.ndarray:
+        """Slopes of those that are linear, or at a place, ``(n, n_joint)``."""
+        rows = self.rows[which]
+        if self._stretches and (on_stretch := which < self.n_angle).any():
+            rows[on_stretch] = self._stretches[0].angles_at(shares[on_stretch])
+        return rows
+
+    def _contacts_at(self, which: np.ndarray, shapes: np.ndarray) -> Any:
+        if (self._group[which] >= 0).any():
+            shapes = np.concatenate([shapes, np.zeros((1, which.size))])
+        for k, group in enumerate(self._groups):
+            here = np.flatnonzero(self._group[which] == k)
+            if here.size:
+                place = self._place[which[here]]
+                yield here, group, *group.pair(place, shapes[:, here]), place
+
+    def values(
+        self, which: np.ndarray, shapes: np.ndarray, shares: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Values ``(n,)``, by default with no share held."""
+        shares = self.fresh_shares(which, shapes) if shares is None else shares
+        values = np.einsum("nj,jn->n", self.linear_rows(which, shares), shapes)
+        for here, group, (first, second), *_ in self._contacts_at(which, shapes):
+            values[here] = held_minimum(first, second, shares[here], group.like.width)
+        return values
+
+    def slopes(self, which: np.ndarray, shapes: np.ndarray, shares: np.ndarray) -> np.ndarray:
+        """Derivatives ``(n_joint, n)`` along the shapes."""
+        slopes = np.zeros((len(shapes) + 1, which.size))
+        slopes[:-1] = self.linear_rows(which, shares).T
+        for here, group, (first, second), taken, numbers, place in self._contacts_at(which, shapes):
+            each = group.like.slopes(taken, numbers).reshape(len(taken), 2, -1)
+            share = shares[here]
+            share = np.where(share < 0, share_of_first(first, second, group.like.width), share)
+            for side, weight in enumerate((share, 1.0 - share)):
+                slopes[group.joints[:, side, place], here] += weight * each[:, side]
+        return slopes[:-1]
 
 
-class Placed(NamedTuple):
-    """A check at instants, one in each of some mesh cells; `matrix` ``(n, k, m)`` takes the m
-    parameters on which it depends to its k shape coordinates there."""
-
-    check: ShapeCheck
-    cells: np.ndarray
-    times: np.ndarray
-    shares: np.ndarray
-    columns: np.ndarray
-    matrix: np.ndarray
-    offset: np.ndarray  # (n_joint, 1)
-
-    @classmethod
-    def at(
-        cls, check: ShapeCheck, cells: np.ndarray, times: np.ndarray, gaits: Any, gait: AnyGait,
-        support: np.ndarray,
-    ) -> Placed:  # fmt: skip
-        """Near a gait in time of a class; `support` as of `shape_support`."""
-        shapes, columns = check.of(gait, times), np.flatnonzero(support[check.joints].any(axis=0))
-        offset = np.zeros((len(shapes), 1)) if check.derivative else gaits.offset(len(shapes))
-        matrix = check.matrix(gaits, times, len(shapes), columns)
-        return cls(check, cells, times, check.share(shapes), columns, matrix, offset)
-
-    def move(self, which: np.ndarray, times: np.ndarray, gaits: Any) -> Placed:
-        """With some of the instants elsewhere in their cells, but for `times`."""
-        matrix = self.matrix.copy()
-        matrix[which] = self.check.matrix(gaits, times, len(self.offset), self.columns)
-        return self._replace(matrix=matrix)
-
-    def shapes(self, v: np.ndarray) -> np.ndarray:
-        """Shapes ``(n_joint, n)``, 0 where the check does not depend on them."""
-        joints = self.check.joints
-        at = (self.matrix @ v[self.columns]).T + self.offset[joints]
-        if len(at) == len(self.offset):
-            return at
-        shapes = np.zeros((len(self.offset), self.times.size))
-        shapes[joints] = at
-        return shapes
-
-    def value(self, v: np.ndarray) -> np.ndarray:
-        return self.check.cut(self.shapes(v), self.shares)[0]
-
-    def slope(self, v: np.ndarray) -> np.ndarray:
-        """Derivatives along parameters, ``(n, n_parameter)``."""
-        check, joints = self.check, self.check.joints
-        if check.row is not None:
-            on_columns = check.row[joints] @ self.matrix
-        else:
-            on_shape = check.slope(self.shapes(v), self.shares[None]).full()[joints]
-            on_columns = (on_shape.T[:, None] @ self.matrix)[:, 0]
-        if self.columns.size == v.size:
-            return on_columns
-        slopes = np.zeros((self.times.size, v.size))
-        slopes[:, self.columns] = on_columns
-        return slopes
-
-
-def shape_support(gaits: Any, mesh: Mesh, n_joint: int) -> np.ndarray:
-    """Whether shape coordinates depend on parameters, ``(n_joint, n_parameter)``: with many links
-    matrices of all would fill the memory."""
-    return np.asarray((gaits.angle_matrix(mesh.times, n_joint) != 0).any(axis=0))
+def _side_by_side(contacts: list[Contact], n_joint: int) -> Contacts:
+    """Where angles are missing, that of a joint `n_joint`, which is straight, and no length."""
+    most, joints, numbers = max(len(each.joints) for each in contacts), [], []
+    for each in contacts:
+        n_angle, taken = len(each.joints), np.array(each.joints)[each.order]
+        first = [each.numbers.shape[1] - n_angle] * (most - n_angle)
+        joints.append(np.insert(taken, [0] * len(first), n_joint, axis=1).T)
+        numbers.append(np.insert(each.numbers, first, 0.0, axis=1).T)
+    return Contacts(contacts[0], np.stack(joints, axis=-1), np.stack(numbers, axis=-1))
 
 
 @lru_cache(maxsize=64)
@@ -169,146 +198,84 @@ def shape_checks(
     far: Pairs = (),
     speeds: tuple[float, ...] = (),
     joint_map: JointMap | None = None,
-) -> list[ShapeCheck]:
-    """Angles within the limit, then contacts of near pairs and of pairs `far`, then rates over the
-    largest allowed, `speeds` [rad per period]."""
-    angles, bounded = ca.SX.sym("q", body.n_joint), body.bounded_angles
-    each: Any = bounded.stretches or bounded.rows
-    check: Any = _stretch_check if bounded.stretches else _angle_check
-    checks = [check(bounded.names[k], angles, part, k) for k, part in enumerate(each)]
-    known = _contact_checks(body)
-    checks += [
-        known.get(contact.name) or known.setdefault(contact.name, _contact_check(contact, angles))
-        for contact in body.contacts(far)
-    ]
-    motors, name = np.eye(body.n_joint), body.defaults.coordinate
-    if joint_map:
-        motors, name = joint_map.inverse, "motor"
-    for j, most in enumerate(speeds):
-        rate = _angle_check(f"speed of {name} {j + 1}", angles, motors[j] / most, -1)
-        checks.append(replace(rate, fixed=(-1.0, 1.0), derivative=1))
-    return checks
-
-
-@lru_cache(maxsize=64)
-def _contact_checks(body: Body) -> dict[str, ShapeCheck]:
-    return {}
-
-
-def _slope(cut: Callable[[Array, Array], Array], angles: ca.SX) -> ca.Function:
-    share = ca.SX.sym("share")
-    slope = ca.sparsify(ca.jacobian(cut(angles, share), angles).T)
-    return ca.Function("slope", [angles, share], [slope])
-
-
-def _angle_check(name: str, angles: ca.SX, row: np.ndarray, place: int) -> ShapeCheck:
-
-    def cut(shapes: Array, shares: Array) -> Array:
-        return namespace(shapes).matmul(row[None], shapes)
-
-    def share(shapes: np.ndarray) -> np.ndarray:
-        return np.full(shapes.shape[1], -1.0)
-
-    slope = _slope(cut, angles)
-    return ShapeCheck(name, lambda shapes: row @ shapes, share, cut, slope, row, place)
-
-
-def _stretch_check(name: str, angles: ca.SX, stretch: Stretch, place: int) -> ShapeCheck:
-    """The largest angle on a stretch of a smooth body."""
-    fine = np.linspace(stretch.first, stretch.last, _PLACES)
-    rows = stretch.angles_at(fine)
-
-    def largest(shapes: np.ndarray) -> np.ndarray:
-        """Place of the maximum, ``(n_time,)``, by a parabola."""
-        heights = np.abs(rows @ shapes)
-        inner = np.clip(np.argmax(heights, axis=0), 1, _PLACES - 2)
-        every = np.arange(heights.shape[1])
-        low, mid, high = (heights[inner + k, every] for k in (-1, 0, 1))
-        bent = low - 2 * mid + high < -_FLAT
-        offset = np.where(bent, vertex(low, mid, high), np.sign(high - low))
-        return fine[inner] + np.clip(offset, -1, 1) * (fine[1] - fine[0])
-
-    def along(shapes: np.ndarray) -> np.ndarray:
-        return cut(shapes, largest(shapes))[0]
-
-    def cut(shapes: Array, places: Array) -> Array:
-        return namespace(shapes).sum_rows(stretch.angles_at(places).T * shapes)
-
-    return ShapeCheck(name, along, largest, cut, _slope(cut, angles), place=place)
-
-
-def _contact_check(contact: Contact, angles: ca.SX) -> ShapeCheck:
-
-    def along(shapes: np.ndarray) -> np.ndarray:
-        return contact.excess(shapes)[0]
-
-    def share(shapes: np.ndarray) -> np.ndarray:
-        first, second = contact.pair(shapes)
-        shares = share_of_first(first, second, contact.width)
-        near = smooth_minimum(first, second, contact.width) > -_HELD_NEAR
-        return np.where(near & (np.abs(shares - 0.5) < 0.5 - _HELD_SHARE), shares, -1.0)[0]
-
-    def cut(shapes: Array, shares: Array) -> Array:
-        xp, (first, second) = namespace(shapes), contact.pair(shapes)
-        tangent = tangent_of_minimum(first, second, 0.5 * (shares + xp.abs(shares)), contact.width)
-        return xp.where(shares < 0, smooth_minimum(first, second, contact.width), tangent)
-
-    slope = _slope(cut, angles)
-    return ShapeCheck(contact.name, along, share, cut, slope, fixed=(-np.inf, 0.0))
+) -> ShapeChecks:
+    return ShapeChecks(body, far, speeds, joint_map)
 
 
 def near_peaks(
-    gait: AnyGait, mesh: Mesh, checks: list[ShapeCheck], limit: Limit
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Cells in which each check might bind soon, and its worst instants there."""
-    fine = np.linspace(0.0, 1.0, SAMPLES + 1)
-    times, found = (mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel(), []
-    shapes = {check.derivative: check.of(gait, times) for check in checks[:1] + checks[-1:]}
-    for check in checks:
+    gaits: Any, table: np.ndarray, mesh: Mesh, checks: ShapeChecks, limit: Limit
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Checks, cells in which each might bind soon for the gait of a class with a table, and its
+    worst instants there, ``(n,)`` each."""
+    lower, upper = checks.bounds(limit)
 
-        def excess(shapes: np.ndarray, check: ShapeCheck = check) -> np.ndarray:
-            return check.excess(check.along(shapes), limit)
+    def excess(which: np.ndarray, times: np.ndarray) -> np.ndarray:
+        starts, found = range(0, which.size, _BLOCK), np.empty(which.size)
+        for at in (slice(start, start + _BLOCK) for start in starts):
+            of, shapes = which[at], checks.shapes(gaits, table, which[at], times[at])
+            values = checks.values(of, shapes)
+            found[at] = np.maximum(values - upper[of], lower[of] - values)
+        return found
 
-        def at_times(t: np.ndarray, check: ShapeCheck = check, excess: Any = excess) -> np.ndarray:
-            return excess(check.of(gait, t.ravel())).reshape(t.shape)
+    fine, every = np.linspace(0.0, 1.0, SAMPLES + 1), np.arange(len(checks.names))
+    times = (mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel()
+    highest = excess(np.repeat(every, times.size), np.tile(times, every.size))
+    most = highest.reshape(every.size, mesh.n, -1).max(axis=2)
+    around = np.pad(most, ((0, 0), (1, 1)), constant_values=-np.inf)
+    peak = (most >= around[:, :-2]) & (most >= around[:, 2:])
+    which, cells = np.nonzero((most > -_NEAR) | (peak & (most > -_FAR)))
 
-        highest = excess(shapes[check.derivative]).reshape(mesh.n, -1).max(axis=1)
-        around = np.concatenate([[-np.inf], highest, [-np.inf]])
-        peak = (highest >= around[:-2]) & (highest >= around[2:])
-        cells = np.flatnonzero((highest > -_NEAR) | (peak & (highest > -_FAR)))
-        left, width = mesh.edges[cells], mesh.h[cells]
-        found.append((cells, peaks(at_times, left, width)[0] if cells.size else left))
-    return found
+    def at_times(t: np.ndarray) -> np.ndarray:
+        return excess(np.repeat(which, t.shape[1]), t.ravel()).reshape(t.shape)
 
-
-def moving(placed: Placed, values: np.ndarray, limit: Limit, mesh: Mesh) -> np.ndarray:
-    """Instants near their bound and off the edges of their cells, ``(k,)`` int."""
-    near = placed.check.excess(values, limit) > -_NEAR
-    share = (placed.times - mesh.edges[placed.cells]) / mesh.h[placed.cells]
-    return np.flatnonzero(near & (share > _STEP) & (share < 1 - _STEP))
+    return which, cells, peaks(at_times, mesh.edges[cells], mesh.h[cells])[0]
 
 
-def following_instants(
-    placed: Placed, which: np.ndarray, gait: AnyGait, mesh: Mesh, limit: Limit
-) -> np.ndarray:
-    """Worst instants of a gait near some of those of another one, in the same cells, by Newton's
-    method."""
-    check, times, cells = placed.check, placed.times[which], placed.cells[which]
-    left, h, held = mesh.edges[cells], mesh.h[cells], np.tile(placed.shares[which], 3)
-    step = _STEP * h
+class Placed(NamedTuple):
+    """Checks at instants, in each of some mesh cells, with the shares that are held there, ``(n,)``
+    each."""
 
-    def heights(t: np.ndarray) -> np.ndarray:
-        shapes = check.of(gait, np.concatenate([t - step, t, t + step]))
-        return check.cut(shapes, held).reshape(3, -1)
+    checks: ShapeChecks
+    which: np.ndarray
+    cells: np.ndarray
+    times: np.ndarray
+    shares: np.ndarray
 
-    sign = np.where(np.isinf(check.nearer_bounds(heights(times)[1], limit)[0]), 1.0, -1.0)
-    for _ in range(_STEPS):
-        last, move = times, vertex(*(sign * heights(times))) * step
-        move = np.clip(move, -_LARGEST * h, _LARGEST * h)
-        times = np.clip(times + move, left + step, left + h - step)
-        if np.abs(times - last).max() < _STEP * step.min():
-            break
-    return times
+    @property
+    def cells_of(self) -> dict[str, np.ndarray]:
+        ends = np.searchsorted(self.which, np.arange(1, len(self.checks.names)))
+        return dict(zip(self.checks.names, np.split(self.cells, ends), strict=True))
+
+    def moving(self, excess: np.ndarray, mesh: Mesh) -> np.ndarray:
+        """Those near their bound and off the edges of their cells, ``(k,)`` int."""
+        share = (self.times - mesh.edges[self.cells]) / mesh.h[self.cells]
+        return np.flatnonzero((excess > -_NEAR) & (share > _STEP) & (share < 1 - _STEP))
+
+    def follow(
+        self, chosen: np.ndarray, gaits: Any, table: np.ndarray, mesh: Mesh, limit: Limit
+    ) -> np.ndarray:
+        """Worst instants of the gait with a table near some of these of another one, in the same
+        cells, by Newton's method."""
+        which, cells, times, held = (each[chosen] for each in self[1:])
+        left, h, checks = mesh.edges[cells], mesh.h[cells], self.checks
+        step, every, held = _STEP * h, np.tile(which, 3), np.tile(held, 3)
+
+        def heights(t: np.ndarray) -> np.ndarray:
+            times = np.concatenate([t - step, t, t + step])
+            shapes = checks.shapes(gaits, table, every, times)
+            return checks.values(every, shapes, held).reshape(3, -1)
+
+        lower, upper = (each[which] for each in checks.bounds(limit))
+        around, going = heights(times), np.ones(which.size, dtype=bool)
+        sign = np.where(around[1] - lower < upper - around[1], -1.0, 1.0)
+        for _ in range(_STEPS):
+            move = np.clip(vertex(*(sign * around)) * step, -_LARGEST * h, _LARGEST * h)
+            last, times = times, np.clip(times + going * move, left + step, left + h - step)
+            going &= np.abs(times - last) >= _STEP * step
+            if not going.any():
+                break
+            around = heights(times)
+        return times
 
 
 class ShapeLimits:
@@ -324,28 +291,24 @@ class ShapeLimits:
         far: Pairs,
     ) -> None:
         gaits, body, self._limit, speeds, *_ = control.admissible
-        gait = gaits.trajectory(parameters, body.n_joint)
+        n_joint, table = body.n_joint, gaits.table(parameters, body.n_joint)
         checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
-        self._p, self._first, self.n_bend = layout.parameters[:, 0], layout.n, 0
-        self._placed = list[tuple[Placed, np.ndarray]]()
-        matrices, offsets = [np.empty((0, self._p.size))], [np.empty(0)]
-        support = shape_support(gaits, mesh, body.n_joint)
-        for check, (cells, times) in zip(
-            checks, near_peaks(gait, mesh, checks, self._limit), strict=True
-        ):
-            each = Placed.at(check, cells, times, gaits, gait, support)
-            linear = check.row is not None or check.place >= 0
-            joints = [] if linear else check.joints
-            places = np.arange(len(joints) * cells.size).reshape(len(joints), cells.size)
-            self._placed.append((each, self._first + self.n_bend + places))
+        which, cells, times = near_peaks(gaits, table, mesh, checks, self._limit)
+        shares = checks.shares(which, checks.shapes(gaits, table, which, times))
+        self._placed = placed = Placed(checks, which, cells, times, shares)
+        self._gaits, self._p = gaits, layout.parameters[:, 0]
+        self._first, self.n_bend = layout.n, 0
+        self._bends = dict[str, np.ndarray]()
+        matrices, self._rest = [np.empty((0, self._p.size))], gaits.offset(n_joint)
+        offsets = [np.empty(0)]
+        for k, contact in enumerate(checks.contacts, checks.n_angle):
+            times, joints = placed.times[placed.which == k], list(contact.joints)
+            places = np.arange(len(joints) * times.size).reshape(len(joints), times.size)
+            self._bends[contact.name] = self._first + self.n_bend + places
             self.n_bend += places.size
-            if joints:
-                matrix = np.zeros((places.size, self._p.size))
-                matrix[:, each.columns] = each.matrix.transpose(1, 0, 2).reshape(
-                    -1, each.columns.size
-                )
-                matrices.append(matrix)
-                offsets.append(np.repeat(each.offset[joints, 0], cells.size))
+            matrix = gaits.angle_matrix(times, n_joint)[:, joints].transpose(1, 0, 2)
+            matrices.append(matrix.reshape(-1, self._p.size))
+            offsets.append(np.repeat(self._rest[joints, 0], times.size))
         self._matrix = sparse.csr_matrix(np.concatenate(matrices))
         self._offset = np.concatenate(offsets)
 
@@ -353,33 +316,32 @@ class ShapeLimits:
         return np.asarray(self._matrix @ parameters + self._offset)
 
     def repeat(self, program: Program) -> dict[str, np.ndarray]:
-        """Add the functions of angles; places of their values by the checks' names."""
-        values = {}
-        for placed, bends in self._placed:
+        """Add the functions of angles; places of their values by the contacts' names."""
+        placed, values = self._placed, {}
+        for k, contact in enumerate(placed.checks.contacts, placed.checks.n_angle):
+            bends, shares = self._bends[contact.name], placed.shares[placed.which == k]
             if bends.size:
-
-                def value(local: ca.SX, share: Any, of: Placed = placed) -> ca.SX:
-                    shape = ca.SX.zeros(len(of.offset))
-                    shape[of.check.joints] = local
-                    return of.check.cut(shape, share)
-
-                values[placed.check.name] = program.repeat(value, [bends], [placed.shares])
+                values[contact.name] = program.repeat(contact.held, [bends], [shares])
         return values
 
     def add_rows(self, program: Program, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Add the rows; cells by the checks' names."""
-        p = program.pick(self._p)
+        placed, p, checks = self._placed, program.pick(self._p), self._placed.checks
+        which, cells_of = placed.which, placed.cells_of
         if self.n_bend:
             bends = program.pick(self._first + np.arange(self.n_bend))
             program.add("bends", bends - self._matrix @ p, self._offset, self._offset)
-        still, cells_of = np.zeros(self._p.size), {}
-        for placed, bends in self._placed:
-            check, cells = placed.check, placed.cells
-            if cells.size and not bends.size:
-                linear = sparse.csr_matrix(placed.slope(still))
-                rows = linear @ p + program.constant(placed.value(still))
+        rows = checks.linear_rows(which, placed.shares)
+        functions = checks.functions(self._gaits, which, placed.times)
+        matrix = self._gaits.pull_back(rows.T, functions)
+        rest = (rows @ self._rest)[:, 0] * (which < checks.n_shape)
+        for k, (name, *bounds) in enumerate(
+            zip(checks.names, *checks.bounds(self._limit), strict=True)
+        ):
+            at = which == k
+            if name in values:
+                value = program.pick(values[name])
             else:
-                rows = program.pick(values.get(check.name, cells))
-            program.add(check.name, rows, *check.bounds(self._limit))
-            cells_of[check.name] = cells
+                value = sparse.csr_matrix(matrix[at]) @ p + program.constant(rest[at])
+            program.add(name, value, *bounds)
         return cells_of

@@ -22,7 +22,7 @@ from colloc.bounds.motions import Domain
 from colloc.bounds.potential import PotentialSpace
 from colloc.bounds.sampled import Bound
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.contact import crossing_sums
+from colloc.mechanics.contact import near_contacts
 from colloc.mechanics.friction import Friction
 from colloc.system.environment import available_threads
 from colloc.system.errors import ProblemError
@@ -176,13 +176,12 @@ def _uncrossed(body: Chain, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     a corner. So is the second.
     """
     low, high = np.where(low.sum(axis=0) < 0, (-high, -low), (low, high))
-    near, turned = (
-        crossing_sums(body, np.stack(each), 0) for each in ((low[0], low[1]), (high[0], low[1]))
+    to_the_left = near_contacts(body)[0]
+    near, turned, other = (
+        to_the_left.pair(np.stack(each))  # over pi
+        for each in ((low[0], low[1]), (high[0], low[1]), (low[0], high[1]))
     )
-    other = crossing_sums(body, np.stack([low[0], high[1]]), 0)
-    crossed = (np.minimum(near[0], turned[0]) > np.pi + 1e-9) & (
-        np.minimum(near[1], other[1]) > np.pi + 1e-9
-    )
+    crossed = (np.minimum(near[0], turned[0]) > 1e-9) & (np.minimum(near[1], other[1]) > 1e-9)
     return ~(crossed[0] & (low >= 0.0).all(axis=0))
 
 

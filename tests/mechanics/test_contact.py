@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -69,7 +70,7 @@ def test_the_gap_between_links_is_that_of_their_points():
     # what a search bounds, of every end and every link but its own
     assert len(ends_and_links(wide)) == 4 * 3
     for end, link in ends_and_links(wide):
-        lacking, w = lacking_width(wide, angles, end, link)[0], wide.width
+        lacking, w = lacking_width(wide, end, link).pair(angles)[0][0], wide.width
         naive = np.hypot(*(points[link] - ends[:, end, :, None])).min(axis=1)
         np.testing.assert_allclose(np.sqrt(w**2 - 2 * w * lacking), naive, atol=0.35 / 200)
 
@@ -91,38 +92,63 @@ def test_the_tangent_planes_of_the_minimum_lie_above_it_and_touch():
 
 
 def corner_peak(gait):
-    """The check at the corner, and the instant and height of its peak, on 40 intervals."""
+    """The checks, which of them is at the corner, and the instant and height of its peak, on 40
+    intervals."""
     problem = Problem(name="corner", guess=AROUND_THE_CORNER)
-    check = next(c for c in shape_checks(problem.body) if c.name.endswith("(left)"))
-    times = near_peaks(gait, control_problem(problem).mesh(), [check], np.pi)[0][1]
-    values = check.along(gait.angles(times))
-    return check, times[[np.argmax(values)]], values.max()
+    checks = shape_checks(problem.body)
+    mesh = control_problem(problem).mesh()
+    which, _, times = near_peaks(Harmonic(1), gait.table, mesh, checks, np.pi)
+    mine = which == checks.names.index("links 1 and 3 (left)")
+    values = checks.values(which[mine], gait.angles(times[mine]))
+    return checks, which[mine][:1], times[mine][[np.argmax(values)]], values.max()
 
 
 def test_the_peak_at_a_corner_is_found_where_dense_sampling_finds_it():
-    check, time, peak = corner_peak(AROUND_THE_CORNER)
-    dense = time + np.linspace(-0.01, 0.01, 200_001)
-    assert check.along(AROUND_THE_CORNER.angles(dense)).max() == pytest.approx(peak, abs=1e-8)
+    checks, corner, time, peak = corner_peak(AROUND_THE_CORNER)
+    dense = AROUND_THE_CORNER.angles(time + np.linspace(-0.01, 0.01, 200_001))
+    every = np.repeat(corner, dense.shape[1])
+    assert checks.values(every, dense).max() == pytest.approx(peak, abs=1e-8)
 
 
 def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
-    check, time, _ = corner_peak(AROUND_THE_CORNER)
-    share = check.share(AROUND_THE_CORNER.angles(time))
+    checks, corner, time, _ = corner_peak(AROUND_THE_CORNER)
+    share = checks.shares(corner, AROUND_THE_CORNER.angles(time))
     assert 0.1 < share[0] < 0.9
     errors, blind = [], []
     for size in (1e-2, 5e-3, 2.5e-3):
         cos = AROUND_THE_CORNER.cos + size * np.array([[0.3], [-0.8]])
         moved = Fourier(np.zeros(2), cos, AROUND_THE_CORNER.sin)
-        height = corner_peak(moved)[2]
-        cut = float(np.array(check.cut(moved.angles(time), share)).ravel()[0])
-        errors.append(abs(cut - height))
-        blind.append(height - check.along(moved.angles(time))[0])
+        height, shape = corner_peak(moved)[3], moved.angles(time)
+        errors.append(abs(checks.values(corner, shape, share)[0] - height))
+        blind.append(height - checks.values(corner, shape)[0])
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all((orders > 1.7) & (orders < 2.3))
     assert errors[-1] < 1e-5
     # without it the constraint at that instant falls behind the peak in proportion to the move
     assert min(blind) > 1e-4
     assert blind[0] > 3 * blind[-1]
+
+
+@pytest.mark.parametrize("lengths", [(0.3, 0.2, 0.15, 0.35), (0.2, 0.2, 0.3, 0.1, 0.1, 0.1)])
+def test_all_contacts_at_once_have_the_values_and_slopes_of_each_by_itself(lengths):
+    """Slopes are compared with CasADi's derivatives of the values."""
+    body = Chain(lengths, width=0.02)
+    checks, q = shape_checks(body, far_pairs(body), (2.0,)), ca.SX.sym("q", body.n_joint)
+    which = np.repeat(np.arange(len(checks.names)), 5)
+    shapes = np.random.default_rng(4).uniform(-2.0, 2.0, (body.n_joint, which.size))
+    shares = np.resize([-1.0, 0.3], which.size)
+    values = checks.values(which, shapes, shares)
+    slopes = checks.slopes(which, shapes, shares)
+    for k, contact in enumerate(body.contacts(far_pairs(body)), checks.n_angle):
+        assert checks.names[k] == contact.name
+        for t in np.flatnonzero(which == k):
+            value = contact.held(q[list(contact.joints), :], shares[t])
+            exact = ca.Function("f", [q], [value, ca.jacobian(value, q)])(shapes[:, t])
+            assert values[t] == pytest.approx(float(exact[0]), abs=1e-13)
+            np.testing.assert_allclose(slopes[:, t], exact[1].full()[0], atol=1e-10)
+    angle, rate = which == 1, which == which[-1]
+    assert np.array_equal(values[angle], shapes[1, angle])
+    assert np.array_equal(values[rate], shapes[0, rate] / 2.0)
 
 
 @pytest.mark.parametrize("order", [1, -1])

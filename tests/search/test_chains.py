@@ -8,11 +8,10 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics.contact import (
     CLEARANCE_SMOOTHING,
     crossing_depth,
+    far_contact,
     far_pairs,
-    intrusions,
     overlapping_pairs,
     passing_depth,
-    smooth_minimum,
 )
 from colloc.search.optimise import crossing_pairs, last_free
 from colloc.transcription.full_program import FullProgram
@@ -33,7 +32,7 @@ def crossing(body, angles, i, j):
 
 def clearance(body, angles, i, j):
     """The smooth function that is not negative only where the links do not cross."""
-    return -smooth_minimum(*intrusions(body, angles, i, j), CLEARANCE_SMOOTHING)
+    return -far_contact(body, i, j).excess(angles)
 
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda b: f"{b.n_link} links")

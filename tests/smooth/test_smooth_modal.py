@@ -92,14 +92,14 @@ def test_the_tangent_is_bounded_wherever_it_is_largest(basis, modes):
     body = ModalBody(modes, basis)
     shapes, checks = np.random.default_rng(modes).normal(size=(modes, 500)), shape_checks(body)
     everywhere = np.abs(body.modes_at(np.linspace(0.0, 1.0, 20001)) @ shapes).max(axis=0)
-    np.testing.assert_allclose(
-        np.max([np.abs(check.along(shapes)) for check in checks], axis=0), everywhere, rtol=2e-5
-    )
-    for check in checks:
-        share = check.share(shapes)
-        np.testing.assert_allclose(check.cut(shapes, share)[0], check.along(shapes), atol=1e-10)
-        slopes = check.slope(shapes, share[None]).full()
-        np.testing.assert_allclose(slopes, body.modes_at(share).T, atol=1e-10)
+    which, every = np.repeat(np.arange(len(checks.names)), 500), np.tile(shapes, len(checks.names))
+    values = checks.values(which, every)
+    largest = np.abs(values).reshape(-1, 500).max(axis=0)
+    np.testing.assert_allclose(largest, everywhere, rtol=2e-5)
+    places = checks.shares(which, every)
+    np.testing.assert_allclose(checks.values(which, every, places), values, atol=1e-10)
+    slopes = checks.slopes(which, every, places)
+    np.testing.assert_allclose(slopes, body.modes_at(places).T, atol=1e-10)
 
 
 def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_programs_let_them():
