@@ -340,27 +340,22 @@ class Domain:
             move[n_joint:, :, _STEADY] *= top.rates != 0.0
             along = (move[n_joint:] * top.rates[:, :, None]).sum(axis=0)
             move[n_joint:] -= along * top.rates[:, :, None]
-            move /= np.maximum(np.sqrt((move**2).sum(axis=0)), _EDGE)
+            move /= np.maximum(np.linalg.norm(move, axis=0), _EDGE)
             move = np.concatenate([move, -move], axis=2) * size[:, None]
             angles = top.angles[:, :, None] + spacing * move[:n_joint]
             angles = np.clip(angles, -self.joint_limit, self.joint_limit).reshape(n_joint, -1)
             rates = top.rates[:, :, None] + turn * move[n_joint:]
-            rates = (rates / np.sqrt((rates**2).sum(axis=0))).reshape(n_joint, -1)
+            rates = (rates / np.linalg.norm(rates, axis=0)).reshape(n_joint, -1)
             tried = np.flatnonzero(self.holds(angles))
             motion, source = self.motions(angles[:, tried], rates[:, tried])
-            height = np.full(angles.shape[1], -np.inf)
-            place = np.zeros(angles.shape[1], dtype=int)
             reached = value(motion)
-            rising = np.argsort(reached)  # of several motions the best is written last
-            height[tried[source[rising]]] = reached[rising]
-            place[tried[source[rising]]] = rising
-            order = np.arange(top.size)
-            choice = np.argmax(height.reshape(top.size, -1), axis=1) + order * 2 * _FRAMES
-            up = height[choice] > best
-            order[up] = top.size + np.arange(up.sum())
-            top = top.join(motion.take(place[choice[up]])).take(order)
-            best = np.where(up, height[choice], best)
-            size = np.where(up, _GROW * size, _SHRINK * size)
+            rising, winner = np.argsort(reached), np.full(top.size, -1)
+            # of all motions that a climb tries, the best is written last
+            winner[tried[source[rising]] // (2 * _FRAMES)] = rising
+            height = np.append(reached, -np.inf)[winner]
+            up = height > best
+            top = top.join(motion).take(np.where(up, top.size + winner, np.arange(top.size)))
+            best, size = np.maximum(height, best), np.where(up, _GROW, _SHRINK) * size
         return top
 
 

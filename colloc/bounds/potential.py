@@ -158,20 +158,15 @@ class PotentialSpace:
     together: int | None = None
 
     @cached_property
-    def bases(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-        """Bases of the real parts (even under the mirror) and of the imaginary parts (odd)."""
-        swap, basis = -1 if self.end_swap else None, self.spline.symmetric_basis
-        return basis(1, swap, self.together), basis(-1, swap, self.together)
-
-    @cached_property
-    def layout(self) -> list[tuple[int, int, slice]]:
-        """(harmonic, 0 real or 1 imaginary, its slice of the free coefficients)"""
-        layout, start = [], 0
+    def layout(self) -> list[tuple[int, sparse.csr_matrix, slice]]:
+        """Harmonic, complex basis, of real parts even under the mirror and imaginary ones that are
+        odd, and its slice of the free coefficients."""
+        swap, layout, stop = -1 if self.end_swap else None, [], 0
+        even, odd = (self.spline.symmetric_basis(m, swap, self.together) for m in (1, -1))
         for k in self.harmonics:
-            for part in (0,) if k == 0 else (0, 1):
-                size = self.bases[part].shape[1]
-                layout.append((k, part, slice(start, start + size)))
-                start += size
+            basis = sparse.hstack([even, 1j * odd], format="csr") if k else even
+            start, stop = stop, stop + basis.shape[1]
+            layout.append((k, basis, slice(start, stop)))
         return layout
 
     @property
@@ -182,18 +177,12 @@ class PotentialSpace:
     def roughness(self) -> sparse.csr_matrix:
         """Integral of the squared second derivatives, harmonic k weighted by k^2."""
         table = self.spline.roughness
-        blocks = [
-            max(k, 1) ** 2 * (self.bases[part].T @ table @ self.bases[part])
-            for k, part, _ in self.layout
-        ]
-        return sparse.block_diag(blocks, format="csr")
+        parts = (max(k, 1) ** 2 * (b.conj().T @ table @ b).real for k, b, _ in self.layout)
+        return sparse.block_diag([*parts], format="csr")
 
     def coefficients(self, free: np.ndarray) -> dict[int, np.ndarray]:
         """Complex spline coefficients of every c_k."""
-        full = {k: np.zeros(self.spline.size, dtype=complex) for k in self.harmonics}
-        for k, part, where in self.layout:
-            full[k] += (1, 1j)[part] * (self.bases[part] @ free[where])
-        return full
+        return {k: basis @ free[where] + 0j for k, basis, where in self.layout}
 
     def largest_ratios(self, free: np.ndarray, motion: CoulombMotion) -> np.ndarray:
         """Largest (gain over heading) / power of each motion; `Samples` of a part at a time are
@@ -262,15 +251,12 @@ class Samples:
     def rows(self, chosen: np.ndarray, heading: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:
         """Gain over power of chosen samples at headings: ``matrix @ free + constant``."""
         motion = self.motion.take(chosen)
-        u, v = motion.velocity
-        constant = (np.cos(heading) * u - np.sin(heading) * v) / motion.power
-        scale, value, slope = 1.0 / motion.power, self.value[chosen], self.slope[chosen]
-        blocks = []
-        for k, part, _ in self.space.layout:
-            cos, sin = np.cos(k * heading) * scale, np.sin(k * heading) * scale
-            along, across = (cos, -sin) if part == 0 else (-sin, -cos)
-            full = sparse.diags(along) @ slope + sparse.diags(across * k * motion.spin) @ value
-            blocks.append(full @ self.space.bases[part])
+        (u, v), value, slope = motion.velocity, self.value[chosen], self.slope[chosen]
+        constant, blocks = (np.cos(heading) * u - np.sin(heading) * v) / motion.power, []
+        for k, basis, _ in self.space.layout:
+            wave = np.exp(1j * k * heading) / motion.power
+            turned = sparse.diags(1j * k * motion.spin * wave) @ value
+            blocks.append(((sparse.diags(wave) @ slope + turned) @ basis).real)
         return sparse.hstack(blocks, format="csr"), constant
 
 

@@ -27,7 +27,7 @@ class CompiledPeriod:
         self._library, self._n_point = native_kernel(kind.body, kind.law), mesh.n_point
         scheme = mesh.scheme.A, mesh.scheme.b, mesh.h, mesh.points.astype(np.int64)
         self._chain = *chain_parameters(kind.body, kind.law), mesh.n_point, 0, mesh.n_point
-        self._mesh = mesh.n, mesh.scheme.s, *map(np.ascontiguousarray, scheme), kind.turn
+        self._mesh = mesh.n, mesh.scheme.s, *scheme, kind.turn
 
     @classmethod
     def of(cls, kind: QuasiStatic, mesh: Mesh) -> Self | None:
@@ -47,9 +47,7 @@ class CompiledPeriod:
         the pace, ``(4, n_point)``; totals. None if some balance is not found."""
         z, out = np.empty((3, self._n_point)), np.empty((4, self._n_point))
         totals, lost = np.empty(4), np.empty(1, dtype=np.int64)
-        of = of or shapes
-        angles, rates, start = map(np.ascontiguousarray, (of.angles, of.rates, start))
-        begin = angles, rates, of.delta, start, _TOLERANCE
+        begin = *(of or shapes)[:3], start, _TOLERANCE
         self._call("colloc_period", shapes, *begin, z, out, totals, lost)
         x, y, rotation, work = totals.tolist()
         return None if lost[0] else (z, out, PeriodTotals(complex(x, y), rotation, work))
@@ -63,13 +61,14 @@ class CompiledPeriod:
         on = np.array([[g.side.real, g.side.imag, g.rotation, g.work] for g in gradients], float)
         on_shape = np.empty((m, self._n_point, 2 * n_joint))
         on_pace = np.empty((m, self._n_point))
-        z, out = np.ascontiguousarray(z), np.ascontiguousarray(out)
         self._call("colloc_period_vjp", shapes, z, out, m, on, on_shape, on_pace)
         return on_shape, on_pace
 
     def _call(self, name: str, shapes: Shapes, *arguments: object) -> None:
-        angles, rates = np.ascontiguousarray(shapes.angles), np.ascontiguousarray(shapes.rates)
-        pace = np.ascontiguousarray(np.broadcast_to(shapes.pace, self._n_point), dtype=float)
-        moving = *self._chain, angles, rates, shapes.delta, *self._mesh, pace
-        if getattr(self._library, name)(*moving, *arguments):
+        pace = np.full(self._n_point, shapes.pace, dtype=float)
+        given = (
+            np.ascontiguousarray(each) if isinstance(each, np.ndarray) else each
+            for each in (*self._chain, *shapes[:3], *self._mesh, pace, *arguments)
+        )  # fmt: skip
+        if getattr(self._library, name)(*given):
             raise MemoryError("no memory for the links of a body.")

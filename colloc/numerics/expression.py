@@ -50,7 +50,7 @@ def _template(text: str, **nodes: ast.expr) -> ast.expr:
 
 
 def _derivative(node: ast.expr, name: str) -> ast.expr:
-    if name not in {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}:
+    if not _has_name(node, name):
         return ast.Constant(0.0)
     if isinstance(node, ast.UnaryOp):
         return ast.UnaryOp(node.op, _derivative(node.operand, name))
@@ -149,31 +149,30 @@ def formula(
         ) from None
 
 
-def _has_name(node: ast.AST) -> bool:
-    return any(isinstance(part, ast.Name) for part in ast.walk(node))
+def _has_name(node: ast.AST, name: str = "") -> bool:
+    return any(isinstance(part, ast.Name) and name in ("", part.id) for part in ast.walk(node))
 
 
 def _check_node(
     text: str, node: ast.AST, known: tuple[str, ...], functions: tuple[str, ...]
 ) -> None:
     allowed = isinstance(node, _NODES)
-    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow) and _has_name(node.right):
-        raise ProblemError(f"'{text}' has an exponent that is no number.")
-    if isinstance(node, ast.Name) and node.id not in known:
-        raise ProblemError(f"'{text}' speaks of {node.id}; it may use {', '.join(known)}.")
-    if isinstance(node, ast.Constant):
-        allowed = type(node.value) in (int, float)
-    if isinstance(node, ast.Compare):
-        allowed = len(node.ops) == 1
-    if isinstance(node, ast.Call):
-        allowed = isinstance(node.func, ast.Name) and not node.keywords
-        if isinstance(node.func, ast.Name):
-            name, count = node.func.id, 3 if node.func.id == "where" else 1
-            if len(node.args) != count:
-                raise ProblemError(
-                    f"'{text}': {name} takes {count} argument{'s' * (count > 1)}, not "
-                    f"{len(node.args)}."
-                )
+    match node:
+        case ast.BinOp(op=ast.Pow()) if _has_name(node.right):
+            raise ProblemError(f"'{text}' has an exponent that is no number.")
+        case ast.Name() if node.id not in known:
+            raise ProblemError(f"'{text}' speaks of {node.id}; it may use {', '.join(known)}.")
+        case ast.Constant():
+            allowed = type(node.value) in (int, float)
+        case ast.Compare():
+            allowed = len(node.ops) == 1
+        case ast.Call(func=ast.Name(id=name), args=given):
+            count, allowed = 3 if name == "where" else 1, not node.keywords
+            if len(given) != count:
+                takes = f"takes {count} argument{'s' * (count > 1)}, not {len(given)}"
+                raise ProblemError(f"'{text}': {name} {takes}.")
+        case ast.Call():
+            allowed = False
     if not allowed:
         raise ProblemError(
             f"'{text}' is no formula that can be differentiated; it may use numbers, + - * / **, "

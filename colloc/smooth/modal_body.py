@@ -121,13 +121,11 @@ class ModalBody(SmoothBody):
     def from_chain(self, lengths: np.ndarray) -> np.ndarray:
         """Nearest in the mean square to the chain's staircase of a tangent angle, whose mean
         direction, a rigid rotation, is left out."""
-        lengths = np.asarray(lengths, dtype=float)
-        ends = np.append(0.0, np.cumsum(lengths)) / lengths.sum()
-        steps = np.tril(np.ones((lengths.size, lengths.size - 1)), -1)
-        nodes, weights = np.polynomial.legendre.leggauss(2 * self.modes + 4)
-        s = ends[:-1, None] + np.diff(ends)[:, None] * 0.5 * (nodes + 1)
-        w = np.diff(ends)[:, None] * 0.5 * weights
-        return self._project(np.einsum("lg,lgm->ml", w, self.modes_at(s)) @ steps)
+        n, ends = len(lengths), np.append(0.0, np.cumsum(lengths)) / np.sum(lengths)
+        edges = np.interp(np.linspace(0, n, 4 * n + 1), np.arange(n + 1), ends)
+        grid = PanelGrid(edges[:, None], 12)
+        stairs = np.repeat(np.tril(np.ones((n, n - 1)), -1), 4 * grid.order, axis=0)
+        return self._project((grid.weights * self.modes_at(grid.nodes[:, 0])).T @ stairs)
 
     def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
         """``sin(2 pi t - 2 pi waves (s - 1/2))`` as nearly as the modes can."""

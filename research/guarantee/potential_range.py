@@ -52,11 +52,11 @@ def turned(space: PotentialSpace, free: np.ndarray) -> np.ndarray:
     rotation does not. By the mirror image ``c_k(-q) = conj(c_k(q))``.
     """
     image = np.empty_like(free)
-    for _, part, where in space.layout:
-        basis = space.bases[part]
+    for _, basis, where in space.layout:
         table = (basis @ free[where]).reshape((space.spline.per_joint,) * space.spline.n_joint)
-        swapped = (-1, 1)[part] * table.transpose().ravel()
-        image[where] = (basis.T @ swapped) / basis.multiply(basis).sum(axis=0).A1
+        swapped = -table.transpose().ravel().conj()
+        sizes = basis.multiply(basis.conj()).sum(axis=0).A1
+        image[where] = (basis.conj().T @ swapped / sizes).real
     return image
 
 
