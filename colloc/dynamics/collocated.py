@@ -26,17 +26,12 @@ def stage_weights(mesh: Mesh) -> np.ndarray:
 
 def point_weights(mesh: Mesh) -> np.ndarray:
     """Quadrature weights ``(n_point,)`` of the points; neighbours may share a point."""
-    weights = np.zeros(mesh.n_point)
-    np.add.at(weights, mesh.points, stage_weights(mesh))
-    return weights
+    return np.bincount(mesh.points.ravel(), stage_weights(mesh).ravel())
 
 
 def sums(increments: np.ndarray, start: float | complex = 0.0) -> np.ndarray:
     """Values at the edges, ``(n + 1,)``, from increments over the intervals."""
-    found = np.empty(increments.size + 1, dtype=increments.dtype)
-    found[0] = 0.0
-    np.cumsum(increments, out=found[1:])
-    return start + found
+    return np.asarray(start + np.append(0.0, np.cumsum(increments)))
 
 
 class CollocatedPose:

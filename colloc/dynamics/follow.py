@@ -36,16 +36,8 @@ class Course(NamedTuple):
     phases: np.ndarray
     """Steps of the solver, ``(n,)``."""
     states: np.ndarray
-    between: list[OdeSolution]
-    """Dense output between any two breaks."""
-
-    def at(self, t: np.ndarray) -> np.ndarray:
-        """States at ascending phases, ``(n_state, n_time)``."""
-        ends = np.array([piece.t_max for piece in self.between[:-1]])
-        parts = np.split(t, np.searchsorted(t, ends))
-        return np.concatenate(
-            [piece(part) for piece, part in zip(self.between, parts, strict=True)], axis=1
-        )
+    at: OdeSolution
+    """States at phases, ``(n_state, n_time)``."""
 
 
 def integrate_period(
@@ -62,7 +54,7 @@ def integrate_period(
     velocities from which the next balance may start: their rates, and what to remember. breaks:
     phases in (0, 1), ascending, at which the rates jump.
     """
-    from scipy.integrate import solve_ivp
+    from scipy.integrate import OdeSolution, solve_ivp
 
     near: Any = None
     first = last = left = 0.0
@@ -76,7 +68,7 @@ def integrate_period(
         found, near = rates(one_sided, state, near)
         return found
 
-    phases, states, between, state = [], [], [], begin
+    phases, states, ends, pieces, state = [], [], [0.0], [], begin
     for first, last in pairwise([0.0, *breaks, 1.0]):
         accuracy = {"rtol": 1e-13, "atol": STEP * tolerance, "max_step": longest}
         for method, most in _METHODS:
@@ -100,5 +92,7 @@ def integrate_period(
         state = run.y[:, -1]
         phases.append(run.t)
         states.append(run.y)
-        between.append(run.sol)
-    return Course(np.concatenate(phases), np.concatenate(states, axis=1), between)
+        ends.extend(run.sol.ts[1:])
+        pieces.extend(run.sol.interpolants)
+    at = OdeSolution(ends, pieces)
+    return Course(np.concatenate(phases), np.concatenate(states, axis=1), at)

@@ -15,6 +15,8 @@ linear; distance and rotation belong to the path of a gait at any pace.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
+from typing import Self
 
 from colloc.mechanics.friction import (
     Coefficients,
@@ -59,12 +61,48 @@ class Elliptic(Friction):
         return f"{super().describe()}, elliptic"
 
     def stretch(self, vs: Array) -> Array:
-        return self.tangential(vs) / self.mu_t
+        return self.mu_s(vs) / self.mu_t
+
+
+class _Power(Coefficients):
+    power: float
+    kernel_numbers = ()
+
+    @property
+    def degree(self) -> float:
+        return float(self.power)
+
+    @property
+    def regularised(self) -> bool:
+        return self.power != 1
+
+    def in_speeds_of(self, unit: float) -> Self:
+        return self.in_units_of(unit**-self.power)
+
+    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
+        growth = regularised_speed(vs, vn, delta) ** (self.power - 1.0)
+        return -self.mu_s(vs) * vs * growth, -self.mu_t * vn * growth
+
+    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        mu_s, mu_t, p = self.mu_s(vs), self.mu_t, self.power - 1.0
+        r = regularised_speed(vs, vn, delta)
+        es, en, growth = vs / r, vn / r, r**p
+        cross = p * es * en * growth
+        return (
+            (mu_s * growth * (1.0 + p * es * es), mu_s * cross),
+            (mu_t * cross, mu_t * growth * (1.0 + p * en * en)),
+        )
+
+    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        # above degree 1 the force outgrows it
+        growth = max(1.0, self.power) * regularised_speed(vs, vn, delta) ** (self.power - 1.0)
+        zero = 0.0 * growth
+        return (self.mu_s(vs) * growth, zero), (zero, self.mu_t * growth)
 
 
 @named_arguments
 @dataclass(frozen=True)
-class PowerLaw(Coefficients):
+class PowerLaw(_Power):
     """Friction that grows like a power of the speed; a law of friction.
 
     Parameters
@@ -86,8 +124,6 @@ class PowerLaw(Coefficients):
     mu_f: float = 1.0
     mu_b: float = 1.0
 
-    kernel_numbers = ()
-
     def __post_init__(self) -> None:
         check_positive(self, *self.by_name, of="friction.")
         if not (is_number(self.power) and 0 <= self.power <= 2):
@@ -97,46 +133,12 @@ class PowerLaw(Coefficients):
             )
 
     @property
-    def degree(self) -> float:
-        return float(self.power)
-
-    @property
-    def regularised(self) -> bool:
-        return self.power != 1
-
-    @property
     def label(self) -> str:
         return f"friction ({self.mu_t:g}, {self.mu_f:g}, {self.mu_b:g}) x speed^{self.power:g}"
 
     def describe(self) -> str:
         each = f"{self.mu_t:g} sideways, {self.mu_f:g} forwards, {self.mu_b:g} backwards"
         return f"{each}, times the speed to the power {self.power:g}"
-
-    def in_speeds_of(self, unit: float) -> PowerLaw:
-        return self.in_units_of(unit**-self.power)
-
-    def _growth(self, vs: Array, vn: Array, delta: Array) -> Array:
-        return regularised_speed(vs, vn, delta) ** (self.power - 1.0)
-
-    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
-        growth = self._growth(vs, vn, delta)
-        return -self.tangential(vs) * vs * growth, -self.mu_t * vn * growth
-
-    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        mu_s, mu_t, p = self.tangential(vs), self.mu_t, self.power - 1.0
-        r, growth = regularised_speed(vs, vn, delta), self._growth(vs, vn, delta)
-        es, en = vs / r, vn / r
-        cross = p * es * en * growth
-        return (
-            (mu_s * growth * (1.0 + p * es * es), mu_s * cross),
-            (mu_t * cross, mu_t * growth * (1.0 + p * en * en)),
-        )
-
-    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        # above degree 1 the force outgrows it
-        growth = max(1.0, self.power) * self._growth(vs, vn, delta)
-        zero = 0.0 * growth
-        return (self.tangential(vs) * growth, zero), (zero, self.mu_t * growth)
 
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
         power = self.power + 1.0
@@ -145,7 +147,7 @@ class PowerLaw(Coefficients):
 
 @named_arguments
 @dataclass(frozen=True)
-class Viscous:
+class Viscous(_Power):
     """Drag per length and speed of a slender body; a law of friction.
 
     Parameters
@@ -166,21 +168,12 @@ class Viscous:
     tangential: float = 1.0
 
     by_name = ("normal", "tangential")
-    degree = 1.0
-    reversible = associated = True
-    regularised = False
-    kernel_numbers = ()
+    power, associated = 1.0, True
+    mu_t = property(attrgetter("normal"))
+    mu_f = mu_b = property(attrgetter("tangential"))
 
     def __post_init__(self) -> None:
         check_positive(self, *self.by_name, of="friction.")
-
-    @property
-    def smallest(self) -> float:
-        return min(self.normal, self.tangential)
-
-    @property
-    def largest(self) -> float:
-        return max(self.normal, self.tangential)
 
     @property
     def label(self) -> str:
@@ -188,21 +181,6 @@ class Viscous:
 
     def describe(self) -> str:
         return f"viscous drag, {self.normal:g} across and {self.tangential:g} along the body"
-
-    def in_units_of(self, unit: float) -> Viscous:
-        return Viscous(normal=self.normal / unit, tangential=self.tangential / unit)
-
-    def in_speeds_of(self, unit: float) -> Viscous:
-        return self.in_units_of(1.0 / unit)
-
-    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
-        return -self.tangential * vs, -self.normal * vn
-
-    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        zero = 0.0 * vs
-        return (self.tangential + zero, zero), (zero, self.normal + zero)
-
-    density_secant = density_jacobian
 
     def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
         return 0.5 * (self.tangential * vs * vs + self.normal * vn * vn)

@@ -51,7 +51,7 @@ class Coefficients:
     mu_t: float
     mu_f: float
     mu_b: float
-    by_name = ("mu_t", "mu_f", "mu_b")
+    by_name: tuple[str, ...] = ("mu_t", "mu_f", "mu_b")
 
     @property
     def smallest(self) -> float:
@@ -78,8 +78,8 @@ class Coefficients:
         scaled = {name: getattr(self, name) / unit for name in self.by_name}
         return replace(self, **scaled)  # type: ignore[type-var]
 
-    def tangential(self, vs: Array) -> Array:
-        """Coefficient mu_s of sliding along the body with velocity `vs`."""
+    def mu_s(self, vs: Array) -> Array:
+        """Coefficient of sliding along the body with velocity `vs`."""
         if self.reversible:
             return self.mu_f
         return namespace(vs).where(vs > 0, self.mu_f, self.mu_b)
@@ -142,18 +142,18 @@ class Friction(Coefficients):
         return 1.0
 
     def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
-        mu_s, vs = self.tangential(vs), self.stretch(vs) * vs
+        mu_s, vs = self.mu_s(vs), self.stretch(vs) * vs
         r = regularised_speed(vs, vn, delta)
         return -mu_s * vs / r, -self.mu_t * vn / r
 
     def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        mu_s, stretch = self.tangential(vs), self.stretch(vs)
+        mu_s, stretch = self.mu_s(vs), self.stretch(vs)
         r = regularised_speed(stretch * vs, vn, delta)
         zero = 0.0 * r
         return (stretch * mu_s / r, zero), (zero, self.mu_t / r)
 
     def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
-        mu_s, mu_t, stretch = self.tangential(vs), self.mu_t, self.stretch(vs)
+        mu_s, mu_t, stretch = self.mu_s(vs), self.mu_t, self.stretch(vs)
         vs = stretch * vs
         r = regularised_speed(vs, vn, delta)
         es, en, ed = vs / r, vn / r, delta / r
@@ -320,7 +320,7 @@ class ClosedForm(LineIntegrals):
     """Coulomb friction on links, also with the tangential velocity stretched."""
 
     def force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
-        mu_s, mu_t, vs = self.law.tangential(vs), self.law.mu_t, self.law.stretch(vs) * vs
+        mu_s, mu_t, vs = self.law.mu_s(vs), self.law.mu_t, self.law.stretch(vs) * vs
         a2, _, S, Q, g, h = _roots(vs, vn, w, length, delta)
         return LinkForce(
             -mu_s * vs * 2.0 * length * g / S,
@@ -341,7 +341,7 @@ class ClosedForm(LineIntegrals):
         )
 
     def jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        mu_s, mu_t, stretch = self.law.tangential(vs), self.law.mu_t, self.law.stretch(vs)
+        mu_s, mu_t, stretch = self.law.mu_s(vs), self.law.mu_t, self.law.stretch(vs)
         vs = stretch * vs
         a2, r0r1, S, Q, _, h = _roots(vs, vn, w, length, delta)
         l3 = length**3
@@ -360,7 +360,7 @@ class ClosedForm(LineIntegrals):
         )
 
     def secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        mu_s, mu_t = self.law.tangential(vs), self.law.mu_t
+        mu_s, mu_t = self.law.mu_s(vs), self.law.mu_t
         I0, I1, I2 = self.moments(vs, vn, w, length, delta)
         zero = 0.0 * I0
         return (
@@ -376,7 +376,7 @@ class ClosedForm(LineIntegrals):
     def scaled_laws(
         self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce
     ) -> list[Array]:
-        mu_s, mu_t = self.law.tangential(vs), self.law.mu_t
+        mu_s, mu_t = self.law.mu_s(vs), self.law.mu_t
         I0, I1, I2 = self.moments(vs, vn, w, length, delta)
         return [
             force.tangential / I0 + mu_s * (self.law.stretch(vs) * vs),
