@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from colloc.bounds.motions import (
-    DELTA,
     CoulombMotion,
     SmallGait,
     admissible,
@@ -30,7 +29,8 @@ from colloc.system.errors import NotConvergedError
 
 _EDGE = 1e-9
 _FINE = 1e-3  # step [rad] at which the search for the best shape ends
-_DELTA = 1e-6
+_DRY, _DELTA = 1e-9, 1e-6
+"""At unit shape speed: Coulomb friction to 1e-8, and half the time."""
 _CLIMBED, _WAYS = 12, 4
 _STEPS = 14
 _ROUNDS = 12
@@ -38,7 +38,7 @@ _GAIN = 1e-7
 
 
 def balanced_motion(
-    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = DELTA
+    body: Chain, friction: Friction, angles: np.ndarray, rates: np.ndarray, delta: float = _DRY
 ) -> CoulombMotion:
     """One motion for each of shapes and rates ``(n_joint, n)`` that converges."""
     return all_motions(body, friction, angles, rates, delta, one_each=True)[0]

@@ -28,9 +28,7 @@ from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.numerics.conic import linear_maximum
 from colloc.system.errors import ProblemError
 
-DELTA, _SAMPLED = 1e-9, 1e-6
-"""At unit shape speed: Coulomb friction to 1e-8, and within reach of the solver; samples take half
-the time at the second, at which the best small gait loses 1.5e-5."""
+_DELTA = 1e-6  # at unit shape speed: the best small gait loses 1.5e-5
 _MOST_LINKS = 5  # samples fill all of shape space
 _MAX_ITERATIONS = 300  # the few motions that need more are left out
 _SINGULAR = 1e-9  # singular value of relative motions along which two links do not move
@@ -70,7 +68,7 @@ def all_motions(
     friction: Friction,
     angles: np.ndarray,
     rates: np.ndarray,
-    delta: float = DELTA,
+    delta: float = _DELTA,
     *,
     one_each: bool = False,
 ) -> tuple[CoulombMotion, np.ndarray]:
@@ -254,8 +252,8 @@ class Domain:
     def motions(self, angles: np.ndarray, rates: np.ndarray) -> tuple[CoulombMotion, np.ndarray]:
         """All balanced motions, and the column each belongs to; not those in which all feet stick,
         which pay nothing: those beside them say what a potential may gain there."""
-        motion, source = all_motions(self.body, self.friction, angles, rates, _SAMPLED)
-        slides = np.flatnonzero(motion.power > self.law.smallest * _SAMPLED)
+        motion, source = all_motions(self.body, self.friction, angles, rates)
+        slides = np.flatnonzero(motion.power > self.law.smallest * _DELTA)
         return motion.take(slides), source[slides]
 
     def lattice(self, shapes: int, directions: int, shift: float = 0.0) -> CoulombMotion:

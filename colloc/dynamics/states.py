@@ -9,7 +9,7 @@ in short ``s = s_0 + H r(s)``. A state either starts where it is told to, or is 
 a period, or the part of one that is solved, where a symmetry sends its start, ``s_end = M s_0``.
 Newton's method, and derivatives of what follows from the states, need solutions with ``I - H R``, R
 being the derivatives of the rates with respect to the states. Interval by interval that is a small
-system in the stages; the states at its begin are handed on.
+system in the stages, which leaves a sparse one in the states at the edges.
 """
 
 from __future__ import annotations

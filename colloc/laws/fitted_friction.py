@@ -133,9 +133,8 @@ def fitted_friction(
         which, k = np.unravel_index(np.abs(off).argmax(), off.shape)
         raise ProblemError(
             f"{name}: no smooth curve is near the coefficients; at speed {speed[k]:g} the best one "
-            f"misses "
-            f"{coefficients[which, k]:g} by {largest:.2g}. Look at that sample, or state a law of "
-            f"your own (OwnLaw)."
+            f"misses {coefficients[which, k]:g} by {largest:.2g}. Look at that sample, or state a "
+            f"law of your own (OwnLaw)."
         )
     rms = float(np.sqrt((off**2).mean()))
     return FittedFriction(_law(fits, v_s, scale), rms, largest, speed.size)
@@ -146,15 +145,11 @@ def _law(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnLaw:
     if not any(fit[1:].any() for fit in fits):
         along, across, back = (fit[0] for fit in fits)
         return Friction(mu_t=across, mu_f=along, mu_b=back)
-    words = []
-    for fit in fits:
-        terms = [
-            term.format(f"{c:.6g}", f"{v_s:.6g}")
-            for term, c in zip(_TERMS, fit, strict=True)
-            if c > 0
-        ]
-        words.append(" + ".join(terms))
-    along, across, back = words
+    terms = ([*zip(_TERMS, fit, strict=True)] for fit in fits)
+    along, across, back = (
+        " + ".join(term.format(f"{c:.6g}", f"{v_s:.6g}") for term, c in each if c > 0)
+        for each in terms
+    )
     if back != along:
         along = f"where(vs > 0, {along}, {back})"
     return OwnLaw(f"-({along})*vs/speed", f"-({across})*vn/speed", speed_unit=scale)
