@@ -217,7 +217,9 @@ class _Linear:
         blocks[1:, 0] += self._gain @ self._response
         blocks[1:, 0] *= -1.0
         columns = np.append([0, n], np.arange(n)[:, None] + [0, 1])
-        rows = blocks.reshape(-1, k, k), columns, np.arange(0, 2 * n + 3, 2)
+        # slopes that are no numbers stay in the stages
+        blocks = np.nan_to_num(blocks.reshape(-1, k, k))
+        rows = blocks, columns, np.arange(0, 2 * n + 3, 2)
         self._edges = splu(sparse.bsr_matrix(rows).tocsc())
 
     def _by_interval(self, at_points: np.ndarray) -> np.ndarray:

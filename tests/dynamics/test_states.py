@@ -110,6 +110,13 @@ def test_a_periodic_motion_is_found_where_others_grow_beyond_all_numbers():
     np.testing.assert_allclose(states, -1.0 / growth, rtol=0, atol=1e-12)
 
 
+def test_where_rates_have_no_slope_there_is_no_motion_and_no_derivative():
+    mesh, slope = Mesh(scheme("gauss-2"), EDGES), np.zeros((2, 2, 10))
+    slope[0, 1, 4], equations = np.nan, CollocatedStates(mesh, np.array([True, False]))
+    assert not equations.solve(lambda s: Rates(s + 1.0, slope), np.zeros(2))[2]
+    assert all(np.isnan(part).any() for part in equations.vjp(slope, np.ones((1, 2, 10))))
+
+
 def test_a_slow_motion_down_a_steep_slope_is_found_where_steps_run_out_of_what_balances():
     """Links that hardly slip sideways: from such a begin of theta, judging a step by the next one
     ends without a motion, as no rate is known there."""
