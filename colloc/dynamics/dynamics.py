@@ -210,6 +210,23 @@ class QuasiStatic:
         """Rows of `Trajectory.slopes` that are the rates of the states."""
         return [OMEGA if name == "theta" else 6 + STATES.index(name) for name in self.states]
 
+    def first_order_change(
+        self,
+        mesh: Mesh,
+        begin: Shapes,
+        slopes: tuple[np.ndarray, np.ndarray],
+        end: Shapes,
+        static: np.ndarray,
+    ) -> np.ndarray:
+        """Change of the states ``(n_state, n_point)`` from shapes with such `Trajectory.slopes` to
+        others near them, and with static parameters that change by so much."""
+        k, grow = len(self.states), self._grow
+        on_shape, on_states = (each[grow] * begin.pace for each in slopes)
+        change = np.concatenate([end.angles - begin.angles, end.rates - begin.rates])
+        rates = np.einsum("rjt,jt->rt", on_shape, change)
+        rates += np.einsum("rkt,k->rt", on_states[:, k:], static[: on_states.shape[1] - k])
+        return self.equations(mesh, begin.unit).first_order_change(on_states[:, :k], rates)
+
     def vjp(
         self,
         mesh: Mesh,
@@ -370,9 +387,8 @@ class Inertial(QuasiStatic):
             link = self.chain.velocity(posture, shapes.rates, slow.now.z)
             at_first = momenta(self.chain, posture, link)
             near_states = np.concatenate([at_first, slow.states]) if slow.states.size else at_first
-        states, out, held = self._periodic_states(mesh, shapes, near_states, static)
-        if not held and near_z is not None:  # from one that is known to another that jumps there
-            return self.simulate(mesh, shapes, static)
+        solve = self._periodic_states if near_z is None else self._newton
+        states, out, held = solve(mesh, shapes, near_states, static)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
         gained, edges = self.equations(mesh, shapes.unit).integrals(rates)

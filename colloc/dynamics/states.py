@@ -133,6 +133,12 @@ class CollocatedStates:
             x = trial
         return x[:, :-1], x[:, -1], bool(now.known and off < _CLOSED)
 
+    def first_order_change(self, on_states: np.ndarray, rates: np.ndarray) -> np.ndarray:
+        """Change of the states ``(n_state, n_point)`` where their rates change by so much, from the
+        rates' derivatives `on_states` ``(n_state, n_state, n_point)``."""
+        gained, whole = self.integrals(rates)
+        return -self._newton(on_states)(np.column_stack([-gained, whole]))[:, :-1]
+
     def solve_intervals(
         self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -126,14 +126,19 @@ class ReducedMotion:
     def _start(
         self, shapes: Shapes, static: np.ndarray
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """States and tail velocities to start from: those of the last gait, or of the last one
-        differentiated moved along its slopes."""
+        """States and tail velocities to start from: those of the last gait differentiated, moved
+        along its slopes, or of the last one."""
         kind, last, begin = self.kind, self._last, self._differentiated
-        if kind.states and last is not None and last.along is not None:
-            states = last.along.states.copy()
-            for each, moved in zip(kind.static_parameters, static - last.along.static, strict=True):
-                states[[each.name == state for state in kind.states]] += moved
-            return states, last.z
+        if kind.states and last is not None:
+            is_near = begin is not None and begin.delta == shapes.delta
+            known: Any = begin if is_near else last
+            states, moved = known.along.states.copy(), static - known.along.static
+            for each, change in zip(kind.static_parameters, moved, strict=True):
+                states[[each.name == state for state in kind.states]] += change
+            if not is_near:
+                return states, None
+            change = kind.first_order_change(self.mesh, known.shapes, known.slopes, shapes, moved)
+            return states + change, known.z
         if begin is None or begin.along is None:
             begin = begin or last
             return None, None if begin is None else begin.z

@@ -237,11 +237,17 @@ class _Collocated(NamedTuple):
     period: dict[str, float]
 
 
-def _collocate(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> _Collocated:
+def _collocate(
+    control: ControlProblem,
+    mesh: Mesh,
+    gait: Any,
+    delta: float,
+    near_states: np.ndarray | None = None,
+) -> _Collocated:
     kind, weights = control.dynamics, stage_weights(mesh)
     angles, rates = gait(mesh.times)
     shapes = Shapes(angles, rates, delta)
-    along = kind.simulate(mesh, shapes, kind.static_of(gait))
+    along = kind.simulate(mesh, shapes, kind.static_of(gait), near_states)
     theta = kind.initial_heading(along.static)
     pose = CollocatedPose.on_mesh(mesh, along.now.z[OMEGA] - kind.turn, along.now.centre, theta)
     now = kind.instants(shapes, pose.theta_on(mesh), along.now.z)
@@ -262,9 +268,10 @@ def _collocate(control: ControlProblem, mesh: Mesh, gait: Any, delta: float) -> 
 def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     """`MeshError` but for the violation."""
     (control, gait, delta, exact), kind = known, known.control.dynamics
-    aims, seen = control.aims, _collocate(control, mesh, gait, delta)
+    # momenta, perhaps theta
+    at_edges, near = exact.at(mesh.edges), exact.at(mesh.times)[: len(kind.states)]
+    aims, seen = control.aims, _collocate(control, mesh, gait, delta, near)
     shapes, along, pose = seen[:3]
-    at_edges = exact.at(mesh.edges)
     angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
     passed = PeriodTotals(
@@ -284,8 +291,7 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     by_states: Any = 0.0
     if exact.solve_intervals is not None:
-        # momenta, perhaps theta
-        states, near = (at[: len(kind.states)] for at in (at_edges, exact.at(mesh.times)))
+        states = at_edges[: len(kind.states)]
         out, ends, solved = exact.solve_intervals(mesh, shapes, along, states[:, :-1], near)
         local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
         rotation = local.rotations - theta

@@ -119,6 +119,36 @@ def test_gradients_are_those_of_differences(fields):
     np.testing.assert_allclose(reduced.gradient(v), differences, atol=atol)
 
 
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "rotation": 0.0},
+        {"froude": colloc.Free(0.05, 0.2), "objective": "distance"},
+    ],
+    ids=["whole", "half", "free pace"],
+)
+def test_momenta_of_a_gait_beside_another_are_predicted_to_first_order(fields):
+    """Half as far away, a quarter of the error. The search starts Newton's method there."""
+    reduced, v = program(problem(intervals=40, **fields))
+    kind, (space, mesh) = reduced.motion.kind, (reduced.space, reduced.space.mesh)
+    direction = np.random.default_rng(7).normal(size=v.size)
+
+    def simulated(v):
+        static = v[v.size - len(kind.static_parameters) :]
+        shapes = Shapes(*space.at(v)[:2], 1e-2)
+        return shapes, static, kind.simulate(mesh, shapes, static)
+
+    begin, static, here = simulated(v)
+    errors = []
+    for size in (2e-3, 1e-3):
+        end, other, there = simulated(v + size * direction)
+        change = kind.first_order_change(mesh, begin, here.slopes(), end, other - static)
+        errors.append(np.abs(there.states - here.states - change).max())
+    assert errors[0] < 0.1 * np.abs(there.states - here.states).max()
+    assert errors[1] == pytest.approx(errors[0] / 4, rel=0.2)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypatch):
     """From momenta of a body length a period. The kernel goes NumPy's way."""
