@@ -136,8 +136,8 @@ class CollocatedStates:
     def first_order_change(self, on_states: np.ndarray, rates: np.ndarray) -> np.ndarray:
         """Change of the states ``(n_state, n_point)`` where their rates change by so much, from the
         rates' derivatives `on_states` ``(n_state, n_state, n_point)``."""
-        gained, whole = self.integrals(rates)
-        return -self._newton(on_states)(np.column_stack([-gained, whole]))[:, :-1]
+        gained, edges = self.integrals(rates)
+        return -self._linear(on_states).solve(np.column_stack([-gained, edges[:, -1]]))[:, :-1]
 
     def solve_intervals(
         self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray
