@@ -8,7 +8,7 @@ first one of the next period, or after which the record repeats itself.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -19,7 +19,7 @@ from scipy.special import fdtrc, stdtrit
 
 from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Fourier
-from colloc.gaits.record import FEWEST, LARGEST, Record, read_record
+from colloc.gaits.record import FEWEST, LARGEST, Column, Record, read_record
 from colloc.mechanics.chain import Chain
 from colloc.system.errors import ProblemError
 
@@ -74,12 +74,12 @@ class FittedGait:
         """`colloc.gaits.record.Record.centre`."""
         return self.record.centre if self.record else 0
 
-    def describe(self) -> str:
+    def describe(self, used: Collection[Column] = ()) -> str:
         if not self.samples:
             return "the series as it was given"
         plural = "s" * (self.gait.n_harmonic > 1)
         rms, largest = (_format(a, self.degrees, ".1e") for a in (self.rms, self.largest))
-        text = f"{self.record.taken}; " if self.record else ""
+        text = f"{self.record.describe(used)}; " if self.record else ""
         if self.centre:
             text += f"all joints move about {self.centre}°, which servos may count from; "
         text += f"{self.gait.n_harmonic} harmonic{plural} through {self.samples} samples"

@@ -4,6 +4,7 @@ their names. What is ambiguous is refused; what was taken is said in one line.""
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -49,10 +50,16 @@ class Record(NamedTuple):
     angles: np.ndarray  # (n_joint, n_time) [rad], from tail to head
     degrees: bool  # whether all were given in degrees
     period: float | None  # that the file states, in its unit of time
-    taken: str  # what was read, and what was left out, in one sentence without its full stop
+    taken: str  # what was read, in one sentence without its full stop
     centre: int  # right angle about which servos are centred [degrees]; 0 if about none
     path: np.ndarray | None  # centre of mass and tail that markers tell, x and y, (2, 2, n_time)
     others: list[tuple[Column, np.ndarray]]  # columns that are neither, and their numbers
+
+    def describe(self, used: Collection[Column] = ()) -> str:
+        """What was read, and what was left out, unless it was of use elsewhere."""
+        left = [column.name for column, _ in self.others if column not in used]
+        more = f" and {len(left) - 3} more" if len(left) > 3 else ""
+        return f"{self.taken}{'; left out: ' * bool(left)}{', '.join(left[:3])}{more}"
 
 
 class Column(NamedTuple):
@@ -134,10 +141,6 @@ def read_record(
     angles -= 2 * np.pi * np.round(angles.mean(axis=1, keepdims=True) / (2 * np.pi))
     if turned := _names(joints, np.abs(angles - raw * units[:, None]).max(axis=1) > 1.0):
         notes.append(f"whole turns taken out of {turned}")
-    left = [c for c in columns if c.name and c not in [*clock, *joints]]
-    if left:
-        more = f" and {len(left) - 3} more" if len(left) > 3 else ""
-        notes.append(f"left out: {', '.join(c.name for c in left[:3])}{more}")
     in_degrees = np.isclose(units, _DEGREE)
     mixed = f" (but {_names(joints, in_degrees)} degrees)" if in_degrees.any() else ""
     angle_unit = "degrees" if in_degrees.all() else f"radians{mixed}"
@@ -151,10 +154,10 @@ def read_record(
     right = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
     centred = n_joint > 1 and np.abs(centres - right).max() < _CENTRED
     centre = int(np.degrees(right).round()) if centred else 0
-    taken, others = "; ".join(facts), [(c, table.values[rows, c.at]) for c in left]
-    return Record(
-        time - time[0], angles, bool(in_degrees.all()), period, taken, centre, places, others
-    )
+    left = (c for c in columns if c.name and c not in [*clock, *joints])
+    others = [(c, table.values[rows, c.at]) for c in left]
+    read = time - time[0], angles, bool(in_degrees.all()), period, "; ".join(facts), centre
+    return Record(*read, places, others)
 
 
 def _names(columns: list[Column], which: np.ndarray) -> str:

@@ -4,10 +4,13 @@ differ in."""
 from __future__ import annotations
 
 import json
-import math
 
+import numpy as np
+
+from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.results.distinct_optima import SAME_GAIT, SAME_VALUE, distance, fourier_series
+from colloc.results.motion import PHASES
 from colloc.results.robot import in_si
 from colloc.results.solution import Solution
 
@@ -28,9 +31,13 @@ def _rows(one: dict[str, str], two: dict[str, str]) -> Rows:
 def _fields(solution: Solution) -> dict[str, str]:
     texts: dict[str, str] = {}
     for name, value in solution.problem.to_dict().items():
-        parts = value if isinstance(value, dict) else {"": value}
+        parts = value if isinstance(value, dict) and name != "guess" else {"": value}
         texts |= {f"{name} {part}".strip(): json.dumps(x) for part, x in parts.items()}
-    return texts
+    return texts | {"guess": f"moves by {_degrees(solution.problem.guess)} deg"}
+
+
+def _degrees(gait: AnyGait) -> str:
+    return ", ".join(f"{x:.0f}" for x in np.degrees(np.ptp(gait.motor_gait.angles(PHASES), axis=1)))
 
 
 def _numbers(solution: Solution) -> dict[str, str]:
@@ -52,7 +59,7 @@ def _numbers(solution: Solution) -> dict[str, str]:
     if "energy_J_per_m" in si:
         numbers["energy [J/m]"] = f"{si['energy_J_per_m']:.4g}"
     return numbers | {
-        "moves by [deg]": ", ".join(f"{math.degrees(swing):.0f}" for swing in solution.swings),
+        "moves by [deg]": _degrees(solution.gait),
         "delta": f"{answer.delta:.1e}",
         "intervals": str(answer.edges.size - 1),
         "iterations": str(sum(step.iterations for step in solution.history)),

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, field
+import re
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from colloc.gaits.harmonic import Fourier
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.parameters import COEFFICIENTS, parameters
 from colloc.gaits.problem import Problem
-from colloc.gaits.record import FEWEST, HEADINGS, Record
+from colloc.gaits.record import FEWEST, HEADINGS, Column, Record
 from colloc.mechanics.chain import Chain
 from colloc.results.motion import lab_outline
 from colloc.search.evaluate import on_fine_mesh, on_mesh, with_motors
@@ -64,9 +65,16 @@ class Identified:
     @property
     def line(self) -> str:
         """For the problem file."""
-        feet = getattr(self.problem.body, "feet", ())
-        own = any(foot.friction is not None for foot in feet)
-        return f"feet={feet!r}" if own else f"friction={self.problem.friction!r}"
+        body: Any = self.problem.body
+        feet = getattr(body, "feet", ())
+        if not any(foot.friction is not None for foot in feet):
+            return f"friction={self.problem.friction!r}"
+        plain = tuple(
+            replace(foot, weight=None) for foot in feet
+        )  # weights are said if they differ
+        text = repr(plain if replace(body, feet=plain).feet == feet else feet)
+        text = re.sub(r", (weight=None|(offset|angle|extent)=0\.0)\b", "", text)
+        return "feet=" + re.sub(r"(?<=place=)0\.\d+", lambda x: f"{float(x[0]):.6g}", text)
 
     def facts(self) -> dict[str, Any]:
         """Plain numbers (JSON); None for an error that is infinite."""
@@ -155,7 +163,7 @@ def identify(
         how["body"] = problem.body  # whose angles markers may tell
     fitted = fitted_gait(path := Path(record), problem.n_motor, **how)
     read: Any = fitted.record
-    measured = _measured(path, read, length)
+    measured, used = _measured(path, read, length)
     fit = _Fit(problem.without_robot, measured, fitted.gait, read.time / fitted.period)
     if mu_forward is not None:
         check_finite(positive=True, mu_forward=mu_forward)
@@ -191,15 +199,16 @@ def identify(
         )
     points = [name for name, k in _POINTS.items() if fit.seen[0, k].any() and name != "center"]
     unit = f"lengths of {length:g} m" if length else "lengths"
-    message = f"{fitted.describe()}; path of {', '.join(points) or 'headings'} in body {unit}"
+    message = f"{fitted.describe(used)}; path of {', '.join(points) or 'headings'} in body {unit}"
     both = zip(values.tolist(), errors.tolist(), strict=True)
     coefficients = dict(zip(fit.names, both, strict=True))
     return Identified(fit.with_(x, 5), coefficients, before, after, tuple(remarks), message)
 
 
-def _measured(path: Path, record: Record, length: float | None) -> np.ndarray:
+def _measured(path: Path, record: Record, length: float | None) -> tuple[np.ndarray, list[Column]]:
     """Measured places of tail, centre and head, and directions there, ``(2, 3, n_time)``, both
-    complex; NaN where there is none."""
+    complex; NaN where there is none. And the columns that tell them."""
+    used = list[Column]()
     table = np.full((3, 3, record.time.size), np.nan)  # x, y, angle; of each
     if record.path is not None:  # of centre and tail
         table[:2, [1, 0]] = record.path.transpose(1, 0, 2)
@@ -216,6 +225,7 @@ def _measured(path: Path, record: Record, length: float | None) -> np.ndarray:
         point = next((_POINTS[word] for word in words if word in _POINTS), int(is_place))
         scale = _UNITS.get(unit, 1.0) / ((is_place and length) or 1.0)
         table["xy".find(what), point] = scale * row
+        used.append(column)
     measured = np.array([table[0] + 1j * table[1], np.exp(1j * table[2])])
     counts = np.isfinite(measured).sum(axis=2)
     if min(counts[counts > 0], default=0) < FEWEST:
@@ -223,7 +233,7 @@ def _measured(path: Path, record: Record, length: float | None) -> np.ndarray:
             f"{path} holds no path of the body: give columns x and y of the centre of mass, or "
             f"head_x, head_y, tail_x, tail_y, or theta."
         )
-    return measured
+    return measured, used
 
 
 class _Fit:
