@@ -70,18 +70,6 @@ _NAMES = {
 """Module to the public names that live there (`__init__.pyi` says the same to type checkers)."""
 _HOME = {name: f"colloc.{module}" for module, names in _NAMES.items() for name in names.split()}
 __all__ = sorted(_HOME)
-_GONE = {
-    "FreePath": "take BSpline(knots=24), which has better gaits than paths of bounded curvature "
-    "(docs/gait_classes.md).",
-    "ArcPath": "gaits are Fourier series, splines (BSpline(...).member) or polygons (Corners).",
-    "Relaxed": "take Polygon(n) with many corners, which come as near as one likes "
-    "(docs/known.md).",
-    "known": "the table of known gaits is a benchmark: python -m benchmarks.referee checks it "
-    "(docs/known.md).",
-    "heading_map": "colloc.slope_motion and a root finder find headings that last "
-    "(docs/howto/slopes.md).",
-}
-"""Former public names, and what to write instead."""
 
 
 @functools.cache
@@ -106,8 +94,4 @@ def __getattr__(name: str) -> object:
         from colloc.system.environment import version_of
 
         return version_of("colloc")
-    if name in _GONE:
-        from colloc.system.errors import ProblemError
-
-        raise ProblemError(f"colloc.{name} is gone: {_GONE[name]}")
     raise AttributeError(f"module 'colloc' has no attribute {name!r}")

@@ -255,26 +255,22 @@ def summary_dict(
     """A solution as one JSON object."""
     problem, answer, certificate = solution.problem, solution.answer, solution.certificate
     replayed = certificate.replayed
-    numbers = ("value", "efficiency", "distance", "work", "travels")
+    plain = {
+        solution: "status message seconds value efficiency distance work travels starts versions",
+        answer: "delta program kkt_error",
+    }
     other = ("value", "delta", "starts", "on_speed_floor")
     stated = ("efficiency", "tolerance", "source")
     return {
         "name": problem.name,
-        "status": solution.status,
-        "message": solution.message,
         "file": None if path is None else str(path),
         "problem_hash": problem.hash,
-        "seconds": solution.seconds,
-        "delta": answer.delta,
         "objective": problem.objective.fields(),
-        **{name: getattr(solution, name) for name in numbers},
+        **{name: getattr(each, name) for each, names in plain.items() for name in names.split()},
         "iterations": sum(step.iterations for step in solution.history),
         "class": problem.gait.describe(),
-        "program": answer.program,
         "variables": int(answer.x.size),
         "constraints": int(answer.lam_g.size),
-        "kkt_error": answer.kkt_error,
-        "starts": solution.starts,
         "shrunk": None if solution.shrunk is None else solution.shrunk.value,
         "limits": limit_use.shares(solution) if replayed else {},
         "robot": in_si(solution),
@@ -286,7 +282,6 @@ def summary_dict(
         "certificate": certificate.facts() if replayed else None,
         "reference": reference and {name: getattr(reference, name) for name in stated},
         "bound": bound_facts(bound),
-        "versions": solution.versions,
     }
 
 

@@ -327,8 +327,8 @@ def draw_gait(axes: Axes, solution: Solution) -> None:
 
 def _draw_angles(axes: Axes, solution: Solution) -> None:
     names, units = solution.problem.body.defaults, drawn_units(solution)
-    angles, ylabel = solution.gait.angles(_T), f"{names.quantity}  [{units.of_angle}]"
-    _draw_series(axes, _T, angles, names.coordinate, xlabel=units.of_time, ylabel=ylabel)
+    ylabel = f"{names.quantity}  [{units.of_angle}]"
+    _draw_series(axes, _T, solution.gait.angles(_T), names.coordinate, units.of_time, ylabel)
     _label_in(units.time, axes.xaxis)
     _label_in(units.angle, axes.yaxis)
 
@@ -394,8 +394,7 @@ def _draw_speeds(axes: Axes, solution: Solution) -> None:
     units = drawn_units(solution)
     delta *= units.speed
     speed = np.maximum(units.speed * speed, 0.1 * delta)
-    ylabel = f"{part} speed  [{units.of_speed}]"
-    _draw_series(axes, _T, speed, part, xlabel=units.of_time, ylabel=ylabel)
+    _draw_series(axes, _T, speed, part, units.of_time, f"{part} speed  [{units.of_speed}]")
     _label_in(units.time, axes.xaxis)
     axes.axhline(delta, color=GREY, lw=1, ls=":")
     axes.annotate("δ", (1.0, delta), (3, 0), textcoords="offset points", color=GREY, va="center")
@@ -522,8 +521,8 @@ def _draw_tracks(axes: Axes, family: Steering) -> None:
 def robot_panels(robot: RobotSheet) -> dict[str, Panel]:
     def panel(what: str, unit: str) -> Panel:
         t, rows = robot.columns["t"].values, robot.columns[f"joint_{what}s"].values
-        labels = {"xlabel": "time  [s],  one period", "ylabel": f"{what}  [{unit}]"}
-        return Panel(COLUMN, 2.2, lambda axes: _draw_series(axes, t, rows, "joint", **labels))
+        labels = "time  [s],  one period", f"{what}  [{unit}]"
+        return Panel(COLUMN, 2.2, lambda axes: _draw_series(axes, t, rows, "joint", *labels))
 
     return {what: panel(what, unit) for what, unit in _QUANTITIES.items()}
 
@@ -548,7 +547,7 @@ def _set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
 
 
 def _draw_series(
-    axes: Axes, t: np.ndarray, rows: np.ndarray, of: str, *, ylabel: str, xlabel: str = "phase t"
+    axes: Axes, t: np.ndarray, rows: np.ndarray, of: str, xlabel: str, ylabel: str
 ) -> None:
     """A line for every joint or part; many are coloured from dark to light, and a few named."""
     count = len(rows)

@@ -179,32 +179,20 @@ def _picture(
 
 def _toy(body: Body, law: Any) -> dict[str, Any] | None:
     """Numbers for the sliders of a page; None but for a chain up to eight links that lies flat."""
-    if (
-        type(body) is not Chain
-        or body.feet
-        or body.n_link > _MOST_PLAYED
-        or type(law) is not Friction
-    ):
+    fits = type(body) is Chain and not body.feet and body.n_link <= _MOST_PLAYED
+    if not fits or type(law) is not Friction:
         return None
-    most = f"{5 * law.largest:.3g}"
-    waves = (("amplitude", 0, 150, 45), ("lag", -180, 180, 90), ("offset", -90, 90, 0))
-    coefficients = (
-        (
-            name,
-            f"{name} {how}",
-            f"{law.smallest / 10:.3g}",
-            most,
-            "any",
-            f"{getattr(law, name):.4g}",
-            "",
-        )
-        for name, how in zip(law.by_name, ("sideways", "forwards", "backwards"), strict=True)
-    )
-    return {
-        "body": {"lengths": body.lengths, "weights": body.weight_column()[:, 0].tolist()},
-        "sliders": [(name, name, low, high, 1, now, "°") for name, low, high, now in waves]
-        + [*coefficients],
-    }
+    sliders: list[tuple[Any, ...]] = [
+        ("amplitude", "amplitude", 0, 150, 1, 45, "°"),
+        ("lag", "lag", -180, 180, 1, 90, "°"),
+        ("offset", "offset", -90, 90, 1, 0, "°"),
+    ]
+    low, high = f"{law.smallest / 10:.3g}", f"{5 * law.largest:.3g}"
+    for name, how in zip(law.by_name, ("sideways", "forwards", "backwards"), strict=True):
+        now = f"{getattr(law, name):.4g}"
+        sliders.append((name, f"{name} {how}", low, high, "any", now, ""))
+    flat = {"lengths": body.lengths, "weights": body.weight_column()[:, 0].tolist()}  # type: ignore[attr-defined]
+    return {"body": flat, "sliders": sliders}
 
 
 def _motion_data(shown: Frames, body: Body) -> dict[str, Any]:
