@@ -207,6 +207,18 @@ def test_an_mjcf_has_classes_degrees_and_capsules(tmp_path, capsys):
     assert "rot2 = joint_1, rot3 = joint_2" in capsys.readouterr().out
 
 
+def test_an_mjcf_counts_angles_from_its_reference_and_the_stated_mass_of_a_body_alone(tmp_path):
+    turned = SWIMMER.replace('name="rot3" class="weak"', 'name="rot3" class="weak" ref="10"')
+    heavy = turned.replace(
+        '<joint name="rot2"', '<inertial pos="0.1 0 0" mass="0.6"/><joint name="rot2"'
+    )
+    problem = read(tmp_path, heavy, kind="xml")
+    assert np.degrees(np.ravel(problem.joint_limit[1])).tolist() == pytest.approx(
+        [-40, 50], rel=1e-5
+    )
+    assert problem.body.weights == pytest.approx([0.25, 0.5, 0.25])
+
+
 def test_friction_of_an_mjcf_is_that_of_geoms_on_the_floor_and_what_is_not_taken_is_said(
     tmp_path, capsys
 ):

@@ -118,6 +118,15 @@ def test_gaits_are_compared_where_start_phase_and_the_symmetries_of_body_and_fri
     } == alike
 
 
+def test_on_two_floors_gaits_are_one_by_what_both_floors_leave_alike():
+    mean, cos, sin = np.array([0.3, -0.1]), np.array([[1.0], [0.2]]), np.array([[0.1], [0.8]])
+    smooth, rough = (Problem("p", friction=Friction(mu_t=1, mu_f=1, mu_b=b)) for b in (1, 1.5))
+    one = SimpleNamespace(problem=smooth, gait=Fourier(mean, cos, sin))
+    back = SimpleNamespace(problem=rough, gait=Fourier(mean, cos, -sin))
+    assert gait_distance(one, back) == pytest.approx(gait_distance(back, one))
+    assert gait_distance(one, back) > 0.1
+
+
 def test_the_same_gait_found_for_another_objective_is_not_the_same_optimum(three_link):
     other = SimpleNamespace(problem=Problem("p", body=Chain((0.2, 0.5, 0.3))))
     assert gait_distance(three_link, other) is None  # of another body

@@ -27,6 +27,7 @@ a wheel between two pads: body=Chain((0.3, 0.4, 0.3), feet=(Pad(0, 0.1, 0.6), Wh
 half a period, and points that neighbours share: gait=Harmonic(1, "antipodal"), scheme="hermite-simpson"
 delta relative to the speed: gait=Polygon(4), friction=ROUGH
 turning as a whole: gait=Harmonic(2), rotation=0.7
+turning as a whole at a pace of its own: gait=Polygon(4), rotation=0.7
 a number of points that no vector divides: gait=BSpline(7), intervals=7, scheme="radau-3"
 """
 CASES = cases(CASES, globals())

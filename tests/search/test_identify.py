@@ -42,6 +42,10 @@ def recorded(path, solution, seed=0, noise=2e-3, periods=2.0, per_period=100, po
     if point == "tail_":
         columns.append(np.degrees(motion.theta) + 30 + np.degrees(noise) * rng.normal(size=t.size))
         names.append("yaw_deg")
+    if head:
+        bends = np.degrees(motion.theta + motion.angles.sum(axis=0))
+        columns.append(bends + 30 + np.degrees(noise) * rng.normal(size=t.size))
+        names.append("head_theta_deg")
     np.savetxt(path, np.column_stack(columns), "%.9g", ",", header=",".join(names), comments="")
     return path
 
