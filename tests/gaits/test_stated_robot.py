@@ -32,6 +32,11 @@ def test_on_a_slope_that_part_of_gravity_counts_which_presses():
     level, slope = (Problem("on", robot=SNAKE, grade=grade) for grade in (0.0, 0.75))
     assert slope.froude == pytest.approx(level.froude * 1.25)
     np.testing.assert_allclose(slope.torque_limit, 1.25 * np.array(level.torque_limit))
+    sought = replace(SNAKE, period=(1.0, 9.0), max_torque=None)
+    level, slope = (Problem("on", robot=sought, grade=grade) for grade in (0.0, 0.75))
+    (speed,), (uphill,) = level.path_limits.each, slope.path_limits.each
+    assert speed.most == pytest.approx((5 * (0.62 / 9.81) ** 0.5,) * 2)
+    assert uphill.most == pytest.approx(np.multiply(speed.most, 1.25**0.5))
 
 
 def test_robots_that_are_one_without_dimensions_are_one_problem():

@@ -21,9 +21,11 @@ def test_where_the_farthest_gait_goes_less_half_of_its_distance_is_asked_for():
     # how far the farthest goes is known on a coarse mesh
     assert least == pytest.approx(0.5 * farthest.distance, rel=0.1)
     assert solution.distance >= least * (1 - 1e-6)
+    assert f"The farthest gait goes {2 * least:.3g} body lengths" in solution.message
     assert f"so half of that was: {least:.3g}" in solution.message
 
 
+@pytest.mark.slow
 def test_a_distance_that_can_be_reached_is_kept_and_costs_efficiency():
     free, far = Problem("free", body=Chain((0.25,) * 4), **HOW), 0.22
     best = colloc.solve(free, starts=8)
