@@ -109,8 +109,10 @@ def test_gaits_are_compared_where_start_phase_and_the_symmetries_of_body_and_fri
         return SimpleNamespace(problem=problem, gait=Fourier(*parts))
 
     # the mirror image, begun elsewhere
-    gait, later = (found(mean, cos, sin), found(-mean, -sin, cos))
+    c, s = np.cos(0.777), np.sin(0.777)
+    gait, later = found(mean, cos, sin), found(-mean, -c * cos - s * sin, s * cos - c * sin)
     assert gait_distance(gait, later) < 1e-9
+    assert gait_distance(gait, found(mean + np.array([0.1, 0.0]), cos, sin)) == pytest.approx(0.1)
     turned = -mean[::-1], -cos[::-1], -sin[::-1]
     others = {"turned": turned, "backwards": (mean, cos, -sin), "both": (*turned[:2], -turned[2])}
     assert {

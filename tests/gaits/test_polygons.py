@@ -132,16 +132,6 @@ def problem(gait, **changes):
     return Problem("p", **({"guess": ellipse(0, 1.5, 1.0), "gait": gait} | changes))
 
 
-def test_problems_of_every_class_survive_their_description():
-    for gait, guess in (
-        (BSpline(6, 1, "bilateral"), TRIANGLE),
-        (Polygon(4, "bilateral", "side"), ellipse(0, 2.0, 1.2)),
-    ):
-        stated = problem(gait, guess=guess, intervals=40)
-        again = Problem.from_dict(stated.to_dict())
-        assert (again.hash, again.gait, again.delta_start) == (stated.hash, gait, 0.01)
-
-
 def test_a_pair_of_closed_joints_that_travels_along_a_folded_chain_wastes_nothing_in_the_limit():
     """All joints are open by e but two neighbours, which are folded: W = e/5, d = W (1 - e^2/24).
     No gait exceeds 1."""

@@ -65,6 +65,11 @@ def test_friction_opposes_the_motion_and_does_not_tell_left_from_right(law):
     fs, fn = law.density(vs, vn, 1e-3)
     assert (fs * vs + fn * vn < 0).all()
     np.testing.assert_array_equal(law.density(vs, -vn, 1e-3), [fs, -fn])
+    if law is not OWN:  # whose friction falls with the speed
+        c, s = np.cos(ways := np.linspace(0.0, 2 * np.pi, 721)[None]), np.sin(ways)
+        fs, fn = law.density(c, s, 1e-9)
+        assert np.hypot(fs, fn).max() == pytest.approx(law.largest, rel=1e-4)
+        assert -(fs * c + fn * s).max() == pytest.approx(law.smallest, rel=1e-4)
 
 
 @each

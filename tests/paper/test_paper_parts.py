@@ -6,7 +6,7 @@ import pytest
 from colloc.system.errors import ProblemError
 from scripts import reproduce_paper
 from scripts.paper import figures, rows
-from scripts.paper.study import Context, PaperStudy, Part, parallel_map, source_closure
+from scripts.paper.study import Context, PaperStudy, Part, source_closure
 from scripts.paper.three_link import third_slowest_dips
 
 
@@ -46,10 +46,6 @@ def test_source_closure_follows_imports():
     found = source_closure("scripts.paper.three_link")
     assert {"colloc.mechanics.fixed_point", "scripts.models.ellipses"} <= found.keys()
     assert not {"scripts.paper.figures", "scripts.paper.study"} & found.keys()
-
-
-def test_parallel_map_keeps_order():
-    assert parallel_map(abs, [-3, 2, -1], processes=2) == [3, 2, 1]
 
 
 def test_verdicts():

@@ -23,13 +23,11 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import is_visible, on_speed_floor
 from colloc.results.store import load
 from colloc.search import checkpoint as ahead
-from colloc.search.certify import certify
 from colloc.search.checkpoint import ROWS, STAGES, Ahead, Run
-from colloc.search.confirm import confirm
 from colloc.search.explore import explore, first_optimum, sketch
-from colloc.search.optimise import descend, project_to_zero_rotation, refine
+from colloc.search.optimise import descend
 from colloc.search.options import SearchOptions
-from colloc.search.solve import certify_answer, choose, solve
+from colloc.search.solve import choose, solve
 from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.files import run_file
 from colloc.system.row_file import put_rows, read_rows
@@ -134,19 +132,6 @@ def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path
     rows = [key.split(" ")[0] for key in read_rows(path, ROWS)]
     for stage in ("optimise", "confirm", "_certificate"):
         assert computed.count(stage) == rows.count(stage) > 0
-
-
-def test_every_stage_makes_the_value_of_the_next_one_and_together_they_are_a_solve():
-    solution = solve(QUICK, 2)
-    optimum = refine(descend(explore(QUICK, 2).optima[0]))
-    assert optimum.optimal
-    answer = confirm(optimum)
-    assert answer.optimal
-    chosen = choose(QUICK, [certify_answer(QUICK, answer)])
-    assert chosen.certificate == certify(answer)
-    np.testing.assert_array_equal(chosen.answer.x, solution.answer.x)
-    assert (chosen.value, chosen.status) == (solution.value, solution.status)
-    assert [step.delta for step in answer.history] == [step.delta for step in solution.history]
 
 
 @pytest.mark.parametrize("shrinking", [False, True])
@@ -359,12 +344,6 @@ def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess(
     assert best.value == seen[-1].value > 1.5 * first.value
     assert best.message.startswith("interrupted; this is the best gait so far.")
     assert solve(QUICK, 1).status != "interrupted"  # it is over then
-
-
-def test_a_stage_refuses_arguments_by_name_which_its_digest_would_miss():
-    gait = QUICK.guess
-    with pytest.raises(TypeError, match="by place"):
-        project_to_zero_rotation(QUICK, gait, delta=0.1)
 
 
 PROBLEM = Problem("quick", gait=Harmonic(1, "none"), **AT)

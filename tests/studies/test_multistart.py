@@ -19,7 +19,6 @@ from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.contact import crossing_depth
-from colloc.results import distinct_optima
 from colloc.results.archive import (
     CRASHED,
     ERROR,
@@ -99,21 +98,6 @@ def test_a_retraced_gait_goes_nowhere_unless_friction_tells_forward_from_backwar
     assert phase_distance(GAIT, reversed_in_time(GAIT)) > 0.1
     assert replayed(retraced, REVERSIBLE).efficiency < 1e-9
     assert replayed(retraced, IRREVERSIBLE).efficiency > 1e-2
-
-
-def test_distance_does_not_see_start_phase_or_symmetry_but_sees_everything_else():
-    def distance(one, other, friction=REVERSIBLE):
-        return distinct_optima.distance(one, other, Chain(), friction)
-
-    for phase in (0.1, 0.37, 0.9):
-        assert phase_distance(GAIT, shift_phase(GAIT, phase)) < 1e-7
-    for image in images(GAIT, Chain(), REVERSIBLE):
-        assert distance(shift_phase(image, 0.21), GAIT) < 1e-7
-    moved = Fourier(GAIT.mean + np.array([0.1, 0.0]), GAIT.cos, GAIT.sin)
-    assert phase_distance(GAIT, moved) == pytest.approx(0.1, rel=1e-6)
-    assert distance(GAIT, reversed_in_time(GAIT), IRREVERSIBLE) > 0.1
-    odd = images(GAIT, Chain((0.2, 0.3, 0.5)), IRREVERSIBLE)[-1]
-    assert distance(GAIT, odd, IRREVERSIBLE) < 1e-7
 
 
 @pytest.mark.parametrize("sampler", SAMPLERS)

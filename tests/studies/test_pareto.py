@@ -132,15 +132,6 @@ FEET = Problem("feet", body=Chain(feet=1), gait=Harmonic(1, "bilateral"), delta=
 
 
 @pytest.mark.slow
-def test_every_gait_is_as_far_and_as_efficient_by_replay(from_the_answer):
-    _, front = from_the_answer
-    assert all(point.success for point in front.points)
-    for point, values in zip(front.points, front.values, strict=True):
-        again = replay(FEET.body, FEET.law, point.gait, point.delta_per_period, instants=3000)
-        np.testing.assert_allclose(values, (again.distance, again.efficiency), rtol=1e-5)
-
-
-@pytest.mark.slow
 def test_from_the_answer_to_the_farthest_none_is_dominated_and_all_differ(from_the_answer):
     best, front = from_the_answer
     farthest = solve(FEET.with_(objective="distance"))
