@@ -59,7 +59,7 @@ def test_known_coefficients_lie_within_the_errors_nineteen_times_in_twenty(crawl
         off.append([(found[x][0] - getattr(TRUE, x)) / found[x][1] for x in ("mu_t", "mu_b")])
     # an error is two standard deviations, so these are about a half, and 1 is rare
     assert (np.abs(off) < 1).mean() > 0.8
-    assert 0.25 < np.sqrt(np.mean(np.square(off))) < 0.75
+    assert 0.4 < np.sqrt(np.mean(np.square(off))) < 0.6  # of 24 numbers it is known to 15 %
 
 
 @pytest.mark.parametrize("point", ["head_", "tail_"])
@@ -97,15 +97,16 @@ def test_directions_alone_tell_coefficients_too(crawled, tmp_path):
     assert "path of headings in body lengths" in found.message
 
 
-def test_markers_at_ends_and_joints_tell_angles_and_path(crawled, tmp_path):
-    motion = crawled.sample(t := np.arange(200) / 100)
-    outline = np.stack(crawled.problem.body.outline(motion.angles))
+def test_markers_at_ends_and_joints_tell_angles_and_path_of_the_centre_of_mass(tmp_path):
+    heavy = FLOOR.with_(body=Chain(masses=(0.6, 0.3, 0.1)))
+    motion = colloc.evaluate(heavy.with_(friction=TRUE), GAIT).sample(t := np.arange(200) / 100)
+    outline = np.stack(heavy.body.outline(motion.angles))
     points = motion.tail[0] + 1j * motion.tail[1]
     points = points + np.exp(1j * motion.theta) * (outline[0] + 1j * outline[1])
     rows = np.column_stack([t, *np.concatenate([60 * points.real, 60 * points.imag])])
     names = "t," + ",".join(f"{axis}_{k}" for axis in "xy" for k in range(1, 5))
     np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header=names, comments="")
-    found = colloc.identify(FLOOR, tmp_path / "a.csv").problem.friction
+    found = colloc.identify(heavy, tmp_path / "a.csv").problem.friction
     assert found.mu_t == pytest.approx(TRUE.mu_t, rel=1e-3)
     assert found.mu_b == pytest.approx(TRUE.mu_b, rel=1e-3)
 
