@@ -252,7 +252,8 @@ def crossing_depth(
         return np.zeros(angles.shape[1])
     ends = np.stack(body.joints(angles))
     if pairs is None:
-        return _overlap(ends, _pairs_apart(body.n_link, 2), body.width, ends_and_links(body))
+        near = _within_reach(ends, _pairs_apart(body.n_link, 2))
+        return _overlap(ends, near, body.width, ends_and_links(body))
     return _overlap(ends, pairs, body.width)
 
 
@@ -266,7 +267,8 @@ def passing_depth(body: Any, angles: np.ndarray) -> float:
     """
     if not is_chain(body):
         return 0.0
-    return _passing(np.stack(body.joints(angles)), _pairs_apart(body.n_link, 2))
+    ends = np.stack(body.joints(angles))
+    return _passing(ends, _within_reach(ends, _pairs_apart(body.n_link, 2)))
 
 
 def overlapping_pairs(ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float) -> Pairs:
@@ -284,7 +286,7 @@ def _overlap(
 ) -> np.ndarray:
     """`crossing_depth` of pairs, and of ends from links, by default those of the pairs."""
     depth = np.zeros(ends.shape[2])
-    for i, j in _within_reach(ends, pairs):
+    for i, j in pairs:
         heights, _ = _seen_ends(ends, i, j)
         crossing = (heights[0] * heights[1] < 0) & (heights[2] * heights[3] < 0)
         depth = np.maximum(depth, np.where(crossing, np.abs(heights).min(axis=0), 0.0))
@@ -302,7 +304,7 @@ def _overlap(
 
 def _passing(ends: np.ndarray, pairs: Sequence[Pair]) -> float:
     deepest = 0.0
-    for i, j in _within_reach(ends, pairs):
+    for i, j in pairs:
         heights, beside = _seen_ends(ends, i, j)
         through = (heights[:, 1:] * heights[:, :-1] < 0) & beside[:, 1:] & beside[:, :-1]
         passed = np.minimum(np.abs(heights[:, 1:]), np.abs(heights[:, :-1]))[through]

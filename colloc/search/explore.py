@@ -227,7 +227,7 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
         with suppress(CollocError):
             sketch(coarse, loop, True, [dry], [loops])
     new_gaits, drawn, n_new = starting_gaits(problem), list[AnyGait | None](), 0
-    tried, improved, best, begin = 0, -OPTIONS.patience, 0.0, time.monotonic()
+    tried, improved, best, begin = 0, -OPTIONS.patience, 0.0, time.process_time()
 
     def measure(candidates: list[Candidate]) -> None:
         # on wheels that hardly resist the best at the last of these deltas may not be the best dry
@@ -263,7 +263,7 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
         return nothing and not starts and bool(problem.path_limits.names)
 
     while tried == 0 or (tried < most and not is_finished() and run.has_time()):
-        ahead.begin((time.monotonic() - begin) / max(tried, 1) * (count - tried))
+        ahead.begin((time.process_time() - begin) / max(tried, 1) * (count - tried))
         later = range(tried, min(tried + 2 * ahead.count, most))
         numbers = n_new + np.cumsum([0, *map(is_turn_of_new, later)])
         for start, number in zip(later, numbers, strict=False):

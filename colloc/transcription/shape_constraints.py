@@ -69,7 +69,11 @@ class ShapeChecks:
     """
 
     def __init__(
-        self, body: Body, far: Pairs, speeds: tuple[float, ...], joint_map: JointMap | None
+        self,
+        body: Body,
+        far: Pairs = (),
+        speeds: tuple[float, ...] = (),
+        joint_map: JointMap | None = None,
     ) -> None:
         bounded, motors, motor = body.bounded_angles, np.eye(body.n_joint), body.defaults.coordinate
         if joint_map:
@@ -192,14 +196,7 @@ def _side_by_side(contacts: list[Contact], n_joint: int) -> Contacts:
     return Contacts(contacts[0], np.stack(joints, axis=-1), np.stack(numbers, axis=-1))
 
 
-@lru_cache(maxsize=64)
-def shape_checks(
-    body: Body,
-    far: Pairs = (),
-    speeds: tuple[float, ...] = (),
-    joint_map: JointMap | None = None,
-) -> ShapeChecks:
-    return ShapeChecks(body, far, speeds, joint_map)
+shape_checks = lru_cache(maxsize=64)(ShapeChecks)
 
 
 def near_peaks(
