@@ -4,7 +4,7 @@
     certificates]
 
 Random chains of 2 to 5 links, frictions, paces and smooth gaits, to random tolerances: played with
-inertia as `colloc.inertial_motion` does, on slopes as a replay does, and measured with inertia as a
+inertia as `colloc.replay` does, on slopes as a replay does, and measured with inertia as a
 certificate does, at 1e-6. For distance, work, rotation and efficiency: how often the true error is
 larger than the stated one, and how many times at most. The references are runs whose steps may err
 a hundred times less than the least of these errors; they state none themselves.
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.tables import markdown_table
-from colloc import Chain, Fourier, Friction, NotConvergedError, inertial_motion
+from colloc import Chain, Fourier, Friction, NotConvergedError, replay
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
 from colloc.results.measured import measure
@@ -107,13 +107,13 @@ def _true_motion(case: Case, near: np.ndarray, aim: float) -> dict[str, float]:
 def motion(case: Case) -> Row:
     """Played with inertia."""
     level = case._replace(gait=Fourier(case.gait.mean, case.gait.cos, case.gait.sin))
-    ran = inertial_motion(*level[:5], tolerance=case.tolerance)
+    ran = replay(*level[:4], froude=level.froude, tolerance=case.tolerance)
     return _row(ran.values, ran.errors, _true_motion(level, ran.states[:3, 0], _finer(ran.errors)))
 
 
 def slope(case: Case) -> Row:
     """On a slope."""
-    on = GaitOnSlope(*case[:4], case.grade, ())
+    on = GaitOnSlope(*case[:4], Regime(grade=case.grade), ())
     ran = replayer(Regime(grade=case.grade))(*case[:4], tolerance=case.tolerance)
     states = on.integrate(np.array([case.gait.theta]), _finer(ran.errors), 1e-3).states
     theta, climb, _, spent, *_ = states[:, -1] - states[:, 0]

@@ -14,7 +14,7 @@ from colloc.smooth.modal_body import ModalBody as ModalBody
 from colloc.smooth.prescribed_body import Concertina as Concertina
 from colloc.smooth.crawler_body import CrawlerBody as CrawlerBody
 from colloc.smooth.prescribed_body import Wave as Wave
-from colloc.mechanics.axle import Axle as Axle
+from colloc.mechanics.friction import Axle as Axle
 from colloc.mechanics.friction import Friction as Friction
 from colloc.laws.resistance import Elliptic as Elliptic
 from colloc.laws.resistance import Viscous as Viscous
@@ -43,7 +43,6 @@ from colloc.search.identify import identify as identify
 from colloc.search.certify import certify as certify
 from colloc.verification.replay import replay as replay
 from colloc.verification.differential_motion import slope_motion as slope_motion
-from colloc.verification.differential_motion import inertial_motion as inertial_motion
 from colloc.verification.differential_motion import motion_from_rest as motion_from_rest
 from colloc.dynamics.slow_enough import slow_enough as slow_enough
 from colloc.mechanics.fixed_point import solve_balance as solve_balance

@@ -183,7 +183,8 @@ def compared(solution: Solution, froude: float, delta: float = DELTA) -> dict[st
     are apart, relative."""
     problem = solution.problem
     distance, work = Played(solution, delta, froude).settled()
-    own = colloc.inertial_motion(problem.body, problem.friction, solution.gait, delta, froude)
+    at = problem.body, problem.friction, solution.gait, delta
+    own = colloc.replay(*at, froude=froude, tolerance=1e-5)
     apart = max(abs(distance / own.distance - 1), abs(work / own.work - 1))
     found = {"distance": distance, "own_distance": own.distance}
     return found | {"work": work, "own_work": own.work, "apart": apart}

@@ -93,7 +93,6 @@ ellipse: A0=0.0, A1=1.0, B1=1.0
 evaluate: problem=PROBLEM, gait=None
 identify: problem=PROBLEM, record="none.csv"
 fitted_friction: table=[[0.1, 1, 2], [0.2, 1, 2], [0.3, 1, 2], [0.5, 1, 2], [1, 1, 2]]
-inertial_motion: **ON, froude=0.0
 load: path="none.h5"
 load_problem: path="none.py"
 motion_from_rest: **ON, froude=0.0
@@ -347,7 +346,6 @@ slope_motion(**ON, grade=0.1, theta="up") -> theta must be a number or None
 slope_motion(**ON, grade=0.1, tolerance=0.0) -> tolerance must be a positive finite number
 slope_motion(*AT, GAIT, -1.0, 0.1) -> delta must be a positive finite number
 motion_from_rest(**ON, froude=0.1, periods=0) -> whole number
-inertial_motion(**ON, froude=0.0) -> froude must be
 slow_enough(ModalBody(), Friction(), GAIT, 1e-2) -> of a ModalBody
 slow_enough(Chain(), DRAG, GAIT, 1e-2) -> pace is part
 slow_enough(**ON, loss=0.9) -> at most

@@ -20,7 +20,6 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from colloc.dynamics.branches import on_one_branch
 from colloc.dynamics.chain import balance_on_slope, momenta_at
 from colloc.dynamics.collocated import CollocatedPose, heading, momenta_image, stage_weights
 from colloc.dynamics.states import CollocatedStates, Rates
@@ -35,6 +34,7 @@ from colloc.mechanics.fixed_point import motion_and_derivatives, solve_balance
 from colloc.mechanics.inertia import STATES, checked_mass, momenta, turning
 from colloc.mechanics.law import Law
 from colloc.mechanics.native_kernel import kernel_repeating, native_kernel
+from colloc.mechanics.solution_branches import on_one_branch
 from colloc.numerics.mesh import Mesh
 
 _MOMENTA, _MORE = slice(len(STATES)), slice(-len(STATES), None)

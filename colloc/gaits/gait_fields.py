@@ -20,10 +20,9 @@ from colloc.gaits.robot import Robot
 from colloc.gaits.serpenoid import Serpenoid, SerpenoidSeries
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.resistance import Elliptic, PowerLaw, Viscous
-from colloc.mechanics.axle import Axle
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import FeetLaw, Foot
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.friction import Axle, Friction
 from colloc.smooth.crawler_body import CrawlerBody
 from colloc.smooth.modal_body import ModalBody
 from colloc.smooth.prescribed_body import Concertina, Wave

@@ -212,8 +212,8 @@ class Regime:
             )
         if not gaits.free:
             raise ProblemError(
-                "a prescribed motion is played with inertia by colloc.inertial_motion: leave "
-                "froude out."
+                "a prescribed motion is played with inertia by colloc.replay(..., froude=...): "
+                "leave froude out of the problem."
             )
         if not gaits.relative_delta and gaits.symmetry not in (NONE, ANTIPODAL):
             raise ProblemError(

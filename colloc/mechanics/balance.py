@@ -22,7 +22,6 @@ TAIL = None
 
 
 def is_chain(body: Any) -> bool:
-    """Whether a body is a `colloc.mechanics.chain.Chain`, which is made of all this."""
     return hasattr(body, "n_link")
 
 
@@ -37,8 +36,6 @@ class Posture(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """Posture, link velocities and friction on the links of a sliding chain."""
-
     posture: Posture
     velocity: LinkVelocity
     force: LinkForce
@@ -60,7 +57,6 @@ class Moving(NamedTuple):
         return self._replace(angles=self.angles[:, chosen], rates=self.rates[:, chosen], load=load)
 
     def at_rest(self, link: int) -> np.ndarray:
-        """Tail velocity ``(3, n_time)`` when a link rests."""
         at = self.body.posture(self.angles, link)
         return self.body.tail_velocity(at, self.rates, np.zeros((3, self.angles.shape[1])), link)
 
@@ -78,8 +74,6 @@ def instant(
     delta: Array,
     reference: int | None = TAIL,
 ) -> Instant:
-    """A chain with joint angles and rates ``(n_joint, n_time)`` whose reference moves with z
-    ``(3, n_time)``."""
     posture = body.posture(angles, reference)
     velocity = body.velocity(posture, rates, z, reference)
     return Instant(posture, velocity, body.contact.force(friction, velocity, delta))
@@ -96,8 +90,7 @@ def net_force(posture: Posture, force: LinkForce) -> Array:
 
 
 def load_wrench(body: Any, posture: Posture, load: Array) -> Array:
-    """Force and torque about the reference, ``(3, n_time)``, of an outside force ``(2, n_time)`` at
-    the centre of mass, in body-frame axes."""
+    """Force and torque about the reference of an outside force on the centre of mass."""
     x, y = body.centre_of_mass(posture)
     return namespace(load).stack([load, x * load[1:2, :] - y * load[0:1, :]])
 

@@ -67,7 +67,6 @@ class BoundedAngles:
     fine: Callable[[np.ndarray], np.ndarray] | None = None
 
     def largest(self, angles: np.ndarray) -> np.ndarray:
-        """Largest magnitude at any place, ``(n_time,)``."""
         values = self.rows @ angles if self.fine is None else self.fine(angles)
         return np.asarray(np.abs(values).max(axis=0))
 
@@ -135,8 +134,7 @@ class Body(Protocol):
         return id(self)
 
     @property
-    def n_joint(self) -> int:
-        """Number of shape coordinates."""
+    def n_joint(self) -> int: ...
 
     def sliding(
         self, friction: Law, angles: Array, rates: Array, z: Array, delta: Array

@@ -142,7 +142,6 @@ class Chain(Body):
         return FloorContact(lengths, whole_links(self.weight_column()[:, 0]), "link")
 
     def law(self, friction: Law) -> Law:
-        """The law of all contacts, for the problem's `friction`."""
         return self.contact.law(friction)
 
     def length_column(self) -> np.ndarray:
@@ -155,7 +154,6 @@ class Chain(Body):
         return np.array(self.masses)[:, None] if self.masses else self.weight_column()
 
     def inertia_column(self) -> np.ndarray:
-        """Moments of inertia of the links about their midpoints, ``(n_link, 1)``."""
         if self.inertias:
             return np.array(self.inertias)[:, None]
         return self.mass_column() * self.length_column() ** 2 / 12
@@ -171,7 +169,6 @@ class Chain(Body):
         return (full if reference is TAIL else full - full[reference]) * self.lengths
 
     def tangent_angles(self, angles: Array) -> Array:
-        """Link tangent angles in the body frame, ``(n_link, n_time)``."""
         return namespace(angles).matmul(self._joint_sum(TAIL), angles)
 
     def posture(self, angles: Array, reference: int | None = TAIL) -> Posture:
@@ -205,12 +202,12 @@ class Chain(Body):
         return namespace(vs).stack([vs, vn - 0.5 * self.lengths[0] * w, w])
 
     def centre_of_mass(self, posture: Posture) -> tuple[Array, Array]:
-        """Centre of mass relative to the reference, two ``(1, n_time)`` rows."""
+        """Centre of mass relative to the reference, two rows."""
         xp, mass = namespace(posture.x), self.mass_column()
         return xp.sum_rows(mass * posture.x), xp.sum_rows(mass * posture.y)
 
     def centre_velocity(self, posture: Posture, link: LinkVelocity) -> tuple[Array, Array]:
-        """Velocity of the centre of mass in body-frame axes, two ``(1, n_time)`` rows."""
+        """Velocity of the centre of mass in body-frame axes, two rows."""
         xp, mass = namespace(link.vs), self.mass_column()
         return (
             xp.sum_rows(mass * (link.vs * posture.cos - link.vn * posture.sin)),
@@ -340,5 +337,5 @@ class Chain(Body):
 
 
 def formulations(body: Body) -> tuple[str, ...]:
-    """`FORMULATIONS` that can be stated for a body, the usual one first."""
+    """`FORMULATIONS` for a body, the usual one first."""
     return FORMULATIONS if isinstance(body, Chain) else (IMPLICIT,)

@@ -42,7 +42,6 @@ _DRY, _VISCOUS = 1e-100, 1e8
 _TINY, _HUGE = np.finfo(float).tiny, np.finfo(float).max
 METHODS = ("auto", "newton", "fixed_point", "direct", "natural")
 MakeBatch = Callable[[np.ndarray, int], Any]
-"""Indices of time points, and their reference, to a batch."""
 
 
 def relative_delta(delta: float, speed: np.ndarray) -> np.ndarray:
@@ -53,7 +52,6 @@ def relative_delta(delta: float, speed: np.ndarray) -> np.ndarray:
 
 
 def groups(anchor: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """The anchors ``(n_time,)`` that occur, and the time points of each."""
     for reference in np.unique(anchor):
         yield int(reference), np.flatnonzero(anchor == reference)
 

@@ -144,7 +144,6 @@ class Instants:
 
 
 def sample() -> dict[str, Any]:
-    """Five time points of three joints at which formulas are tried."""
     rng = np.random.default_rng(0)
     angle, rate, moment = rng.uniform(0.2, 1.0, (3, 3, 5)) * rng.choice([-1.0, 1.0], (3, 3, 5))
     more = {"power": moment * rate, "idle": 1e-3}
@@ -212,7 +211,7 @@ class _OfInstants:
             raise ProblemError(f"{what}: '{text}' has no finite value at a usual instant.")
 
     def fields(self) -> dict[str, Any]:
-        """Return it as plain numbers and text (JSON)."""
+        """As plain numbers and text (JSON)."""
         stated: dict[str, Any] = asdict(self)  # type: ignore[call-overload]
         return {k: list(v) if isinstance(v, tuple) else v for k, v in stated.items()}
 
@@ -266,10 +265,6 @@ class Quantity(_OfInstants):
     def at(self, now: Instants) -> Array:
         """Density per unit of time of the instants, ``(1, n_time)``."""
         return self._value(now) / now.unit
-
-    def of_shapes(self, angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
-        """Density of shapes and their rates ``(n_joint, n_time)``, where it needs no forces."""
-        return np.asarray(self._formula({"angle": angles, "rate": rates}))
 
 
 # the small number is for a derivative where a joint turns back
@@ -346,11 +341,10 @@ class PathLimit(_OfInstants):
 
     @cached_property
     def of_each(self) -> bool:
-        """Whether it bounds every joint."""
         return self._formula(sample()).shape[0] == 3
 
     def on(self, n_joint: int) -> PathLimit:
-        """Return it with a bound for each of its values. `ProblemError` if there are others."""
+        """Return it with a bound for each of its values."""
         rows = n_joint if self.of_each else 1
         if np.size(self.most) not in (1, rows):
             raise ProblemError(
@@ -366,7 +360,7 @@ class PathLimit(_OfInstants):
         return tuple(f"{self.name} of joint {j + 1}" for j in range(np.size(self.most)))
 
     def at(self, now: Instants) -> Array:
-        """Values over their bounds, ``(n_row, n_time)``."""
+        """Values over their bounds."""
         return self._value(now) / np.array(self.most)[:, None]
 
 
@@ -392,7 +386,7 @@ class PathLimits:
         return any(limit.needs_forces for limit in self.each)
 
     def at(self, now: Instants) -> Array:
-        """Shares: values over their bounds, ``(n_share, n_time)``."""
+        """Values over their bounds, ``(n_share, n_time)``."""
         return namespace(now.rates).stack([limit.at(now) for limit in self.each])
 
     def sizes(self, shares: np.ndarray) -> np.ndarray:
@@ -408,7 +402,6 @@ class PathLimits:
 
 
 def stated_limit(stated: Any) -> PathLimit:
-    """A limit, as it is or from `PathLimit.fields`. `ProblemError` if it is none."""
     if not isinstance(stated, (PathLimit, dict)):
         raise ProblemError(
             f"limits are of the kind PathLimit(name, function, most), not {stated!r}."
@@ -416,7 +409,10 @@ def stated_limit(stated: Any) -> PathLimit:
     return stated if isinstance(stated, PathLimit) else PathLimit(**stated)
 
 
-def limits_of(asked: Iterable[PathLimit] | PathLimits, n_joint: int) -> PathLimits:
+Limits = Iterable[PathLimit] | PathLimits
+
+
+def limits_of(asked: Limits, n_joint: int) -> PathLimits:
     if isinstance(asked, PathLimits):
         return asked
     return PathLimits(tuple(each.on(n_joint) for each in asked))

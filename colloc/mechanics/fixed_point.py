@@ -39,8 +39,7 @@ _AWAY = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
 """Steps by which a balance is followed to a time point, in the time in which velocities change by
 about delta."""
 Found = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Tail velocity ``(3, n_time)``, residual, iterations, anchor ``(n_time,)``, its velocity ``(3,
-n_time)``."""
+"""Tail velocity, residual, iterations, anchor, its velocity."""
 
 
 def solve_balance(
@@ -126,7 +125,6 @@ def solve_balance(
 
 
 def _check_array(name: str, values: np.ndarray, rows: int, n_time: int | None = None) -> np.ndarray:
-    """Finite floats ``(rows, n_time)``, or a `ProblemError`."""
     try:
         array = np.atleast_2d(np.asarray(values))
     except ValueError:  # rows of different lengths
@@ -200,8 +198,6 @@ def _search(
 
 
 class _Batch:
-    """Time points that share a reference link (`colloc.mechanics.damped_newton`)."""
-
     def __init__(self, moving: Moving, reference: int) -> None:
         self.moving, self.friction, self.reference = moving, moving.friction, reference
 
@@ -233,7 +229,6 @@ class _Batch:
 
 
 def _midpoint_velocity(now: Instant, link: np.ndarray) -> np.ndarray:
-    """Velocity ``(3, n_time)`` of the midpoint of a link ``(n_time,)``."""
     c, s, *_, vs, vn, w = (
         np.take_along_axis(row, link[None], 0)[0] for row in (*now.posture, *now.velocity)
     )
@@ -289,8 +284,7 @@ def chain_motion(
     solved: BalanceSolution,
     load: np.ndarray | None = None,
 ) -> BalancedMotion:
-    """The motion of a chain; under a load the actuators' power is that of friction less the
-    load's. Arguments as for `solve_balance`."""
+    """The motion of a chain; the power of a load counts for the actuators'."""
     return _following(Moving(body, body.law(friction), angles, rates, delta, load), solved)[0]
 
 
@@ -343,8 +337,7 @@ def _following(
 
 @lru_cache(maxsize=128)
 def _derivatives(body: Any, friction: Law, anchor: int | None, *, pulled: bool) -> Any:
-    """Derivatives along (angles, rates, load) at the velocity of a chain's anchor, or of a tail, by
-    the implicit function theorem."""
+    """By the implicit function theorem, at the velocity of a chain's anchor, or of a tail."""
     from colloc.numerics.repeated import implicit_derivatives  # loads CasADi
 
     n = body.n_joint

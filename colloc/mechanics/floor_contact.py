@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.mechanics.axle import Axle
-from colloc.mechanics.friction import Friction, LinkForce, LinkVelocity, line_integrals
+from colloc.mechanics.friction import Axle, Friction, LinkForce, LinkVelocity, line_integrals
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import STATED_IF_SET, is_number, is_whole, named_arguments, shown
@@ -129,16 +128,13 @@ class Foot:
 
     @property
     def mirrored(self) -> Foot:
-        """The foot on the mirror image of the body."""
         return replace(self, offset=-self.offset, angle=-self.angle)
 
     def from_head(self, n_link: int) -> Foot:
-        """Return the foot on the body counted from its other end."""
         link, place = n_link - 1 - self.link, 1.0 - self.place
         return replace(self, link=link, place=place, offset=-self.offset)
 
     def is_like(self, other: Foot) -> bool:
-        """Return whether two feet are the same up to rounding."""
         a, b = ((f.link, f.place, f.weight or 0.0, f.offset, f.extent) for f in (self, other))
         # a reversible law has no forward direction
         turns = 1 if self.friction is None or not self.friction.reversible else 2
@@ -158,10 +154,9 @@ def Wheel(
 ) -> Foot:
     """Return a passive wheel: a foot that slides easily along its rolling direction only.
 
-    A wheel that turns freely on its axle resists rolling and slipping sideways regardless of each
-    other: ``axle=True``, the law `Axle`. By default its friction is Coulomb's, `Friction`, of one
-    size whichever way it slides: that of a skate, a scale or a locked wheel, which hold less and
-    less sideways the faster they slide along.
+    By default its friction is Coulomb's, `Friction`: that of a skate, a scale or a locked wheel,
+    which hold less and less sideways the faster they slide along. A wheel that turns freely on its
+    axle has the law `Axle`.
 
     Parameters
     ----------
@@ -313,6 +308,10 @@ def same_feet(feet: Sequence[Foot], others: Sequence[Foot]) -> bool:
     return True
 
 
+def _of_all(name: str, joined: Any) -> Any:
+    return property(lambda feet: joined(getattr(law, name) for law in feet.laws))
+
+
 @dataclass(frozen=True)
 class FeetLaw:
     """Laws of feet that do not all have the same, foot by foot, as one `Law`.
@@ -332,25 +331,9 @@ class FeetLaw:
         degrees = {law.degree for law in self.laws}
         return degrees.pop() if len(degrees) == 1 else None
 
-    @property
-    def reversible(self) -> bool:
-        return all(law.reversible for law in self.laws)
-
-    @property
-    def associated(self) -> bool:
-        return all(law.associated for law in self.laws)
-
-    @property
-    def regularised(self) -> bool:
-        return any(law.regularised for law in self.laws)
-
-    @property
-    def smallest(self) -> float:
-        return min(law.smallest for law in self.laws)
-
-    @property
-    def largest(self) -> float:
-        return max(law.largest for law in self.laws)
+    reversible, associated = _of_all("reversible", all), _of_all("associated", all)
+    regularised = _of_all("regularised", any)
+    smallest, largest = _of_all("smallest", min), _of_all("largest", max)
 
     @property
     def label(self) -> str:
@@ -419,13 +402,11 @@ class FloorContact:
 
     @property
     def force_names(self) -> tuple[str, ...]:
-        """Names of the contact forces: along and across every part, and couples on pads."""
         every = range(len(self.parts))
         kinds = ("tangential force", every), ("normal force", every), ("couple", self.pads)
         return tuple(f"{kind} on {self.called} {k + 1}" for kind, rows in kinds for k in rows)
 
     def couples(self, parts: Sequence[int]) -> list[int]:
-        """Indices among the contact forces of the couples on pads."""
         return [2 * len(self.parts) + self.pads.index(part) for part in parts]
 
     def law(self, friction: Law) -> Law:
@@ -457,8 +438,6 @@ class FloorContact:
         return self._groups[friction]
 
     def velocities(self, velocity: LinkVelocity) -> LinkVelocity:
-        """Velocity of the parts' middles along and across their directions, and their rotation
-        rate, ``(n_part, n_time)`` each."""
         vs, vn, w = (row[self.links, :] for row in velocity)
         vs, vn = vs - self.offset * w, vn + self.along * w
         return LinkVelocity(self.cos * vs + self.sin * vn, self.cos * vn - self.sin * vs, w)
@@ -491,7 +470,7 @@ class FloorContact:
         return stack(rows)
 
     def on_links(self, forces: Array) -> LinkForce:
-        """Force and couple on the links from contact forces: T' f."""
+        """T' f of contact forces."""
         n, matmul = len(self.parts), namespace(forces).matmul
         along, across = forces[:n, :], forces[n : 2 * n, :]
         fs, fn = self.cos * along - self.sin * across, self.sin * along + self.cos * across
@@ -516,12 +495,10 @@ class FloorContact:
         return total
 
     def potential(self, friction: Law, velocity: LinkVelocity, delta: Array) -> np.ndarray:
-        """Dissipation potential of the parts, ``(n_part, n_time)``; of associated laws only."""
         values = self._evaluate(friction, velocity, delta, "potential")
         return np.concatenate([self.pressure[group.rows] * value for group, value in values])
 
     def largest_forces(self, friction: Law) -> np.ndarray:
-        """Largest magnitudes of the contact forces, ``(n_force, 1)``."""
         most = np.full((3, len(self.parts), 1), np.inf)
         for rows, law, pads in self.groups(friction):
             if pads:
@@ -532,7 +509,6 @@ class FloorContact:
         return np.concatenate([most[0], most[1], most[2, self.pads]])
 
     def most_held(self, friction: Law) -> float:
-        """Largest pull on the body that friction may hold, over its weight."""
         return float(self.weight[:, 0] @ [law.largest for law in self.laws(friction)])
 
     def slowest(self, velocity: LinkVelocity) -> np.ndarray:

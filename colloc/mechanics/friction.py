@@ -21,6 +21,7 @@ Two panels meet at y = 0, or at the end nearest to it: a law may have a kink the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import singledispatch
@@ -46,8 +47,6 @@ _SMALL = 1e-8
 
 
 class Coefficients:
-    """Coefficients of sliding across the body, forwards and backwards."""
-
     mu_t: float
     mu_f: float
     mu_b: float
@@ -63,12 +62,9 @@ class Coefficients:
 
     @property
     def isotropic(self) -> bool:
-        """Whether all coefficients are equal."""
         return self.mu_t == self.mu_f == self.mu_b
 
-    @property
-    def associated(self) -> bool:
-        return self.isotropic
+    associated = isotropic
 
     @property
     def reversible(self) -> bool:
@@ -125,7 +121,6 @@ class Friction(Coefficients):
 
     @property
     def label(self) -> str:
-        """A short name with its numbers."""
         return f"friction ({self.mu_t:g}, {self.mu_f:g}, {self.mu_b:g})"
 
     def describe(self) -> str:
@@ -172,8 +167,8 @@ def regularised_speed(vs: Array, vn: Array, delta: Array) -> Array:
 
 
 class LinkVelocity(NamedTuple):
-    """Velocity of links along and across themselves at their midpoints, and rotation rates,
-    ``(n_link, n_time)`` each; or of parts of links."""
+    """Velocity of links, or parts of them, along and across themselves at their midpoints, and
+    rotation rates."""
 
     vs: Array
     vn: Array
@@ -181,15 +176,12 @@ class LinkVelocity(NamedTuple):
 
 
 class LinkForce(NamedTuple):
-    """Friction on a link: tangential force, normal force, couple about the midpoint."""
-
     tangential: Array
     normal: Array
     couple: Array
 
 
 def power(vs: Array, vn: Array, w: Array, force: LinkForce) -> Array:
-    """Rate of work against friction of each link."""
     return -(force.tangential * vs + force.normal * vn + force.couple * w)
 
 
@@ -415,3 +407,121 @@ def _roots(vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> tuple
     g_large = 0.5 * xp.log((1.0 + safe) * (1.0 + safe) * Q * S * S / (2.0 * a2)) / safe
     h = xp.where(small, h_small, (g_large - 1.0) / (safe * safe))
     return a2, r0r1, S, Q, 1.0 + q * h, h
+
+
+# a wheel on an axle: its part across is a law of Coulomb in whose speed the velocity along does not
+# count, and so is its part along, turned by a right angle
+
+
+class _Across(Friction):
+    associated = True
+
+    def stretch(self, vs: Array) -> Array:
+        return 0.0
+
+
+@named_arguments
+@dataclass(frozen=True)
+class Axle:
+    """Rolling resistance along and dry friction across, one regardless of the other; a law of
+    friction.
+
+    A wheel that turns on an axle has both: however fast it rolls, it slips sideways only when
+    pushed with `sideways` times its load. Under `Friction` and `Elliptic`, as under a skate or a
+    scale that slides, sliding one way uses up what holds the other way. Snake-robot papers write it
+    as Coulomb friction with a sign function for each direction (Liljebäck et al., Snake Robots,
+    2013). It has a convex potential: one motion is balanced.
+
+    Parameters
+    ----------
+    rolling, sideways : float
+        Friction along the body, either way, and across it, in units of the weight; both positive.
+
+    Examples
+    --------
+    >>> from colloc import Axle, Chain, Problem
+    >>> Problem("snake", body=Chain(feet=1), friction=Axle(rolling=0.02, sideways=1.0)).law.label
+    'axle (0.02, 1)'
+    """
+
+    rolling: float = 0.02
+    sideways: float = 1.0
+
+    by_name = ("rolling", "sideways")
+    degree = 0.0
+    reversible = associated = regularised = True
+
+    def __post_init__(self) -> None:
+        check_positive(self, *self.by_name, of="friction.")
+
+    @property
+    def smallest(self) -> float:
+        return min(self.rolling, self.sideways)
+
+    @property
+    def largest(self) -> float:
+        return math.hypot(self.rolling, self.sideways)
+
+    @property
+    def label(self) -> str:
+        return f"axle ({self.rolling:g}, {self.sideways:g})"
+
+    def describe(self) -> str:
+        return f"{self.rolling:g} rolling and {self.sideways:g} sideways, each by itself"
+
+    def in_units_of(self, unit: float) -> Axle:
+        return Axle(rolling=self.rolling / unit, sideways=self.sideways / unit)
+
+    def in_speeds_of(self, unit: float) -> Axle:
+        return self
+
+    @property
+    def kernel_numbers(self) -> tuple[float, ...]:
+        """Numbers of the part across, then of the part along."""
+        across, along = _Across(mu_t=self.sideways), _Across(mu_t=self.rolling)
+        return across.kernel_numbers + along.kernel_numbers
+
+    def density(self, vs: Array, vn: Array, delta: Array) -> tuple[Array, Array]:
+        (ss, _), (_, nn) = self.density_secant(vs, vn, delta)
+        return -ss * vs, -nn * vn
+
+    def density_secant(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        zero = 0.0 * (vs + vn)
+        rs, rn = regularised_speed(vs, zero, delta), regularised_speed(zero, vn, delta)
+        return (self.rolling / rs, zero), (zero, self.sideways / rn)
+
+    def density_jacobian(self, vs: Array, vn: Array, delta: Array) -> Matrix:
+        (ss, zero), (_, nn) = self.density_secant(vs, vn, delta)
+        along, across = delta * ss / self.rolling, delta * nn / self.sideways
+        return (along * along * ss, zero), (zero, across * across * nn)
+
+    def density_potential(self, vs: Array, vn: Array, delta: Array) -> Array:
+        rs, rn = (regularised_speed(v, 0.0 * v, delta) for v in (vs, vn))
+        return self.rolling * rs + self.sideways * rn
+
+
+@line_integrals.register(Axle)
+class OnLinks(ClosedForm):
+    """A row of wheels along a link, all of which roll alike."""
+
+    scaled_laws = LineIntegrals.scaled_laws
+
+    def __init__(self, law: Axle) -> None:
+        super().__init__(_Across(mu_t=law.sideways, mu_f=law.rolling, mu_b=law.rolling))
+        self.axle = law
+
+    def force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
+        along = length * self.axle.density(vs, vn, delta)[0]
+        return super().force(vs, vn, w, length, delta)._replace(tangential=along)
+
+    def jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        (_, *none), *across = super().jacobian(vs, vn, w, length, delta)
+        return (length * self.axle.density_jacobian(vs, vn, delta)[0][0], *none), *across
+
+    def secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
+        (_, *none), *across = super().secant(vs, vn, w, length, delta)
+        return (length * self.axle.density_secant(vs, vn, delta)[0][0], *none), *across
+
+    def potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
+        along = length * self.axle.rolling * regularised_speed(vs, 0.0 * vs, delta)
+        return super().potential(vs, vn, w, length, delta) + along

@@ -32,9 +32,6 @@ Path = Callable[[np.ndarray], tuple[np.ndarray, ...]]
 
 
 class MomentumRates(NamedTuple):
-    """Rates of the momenta ``(3, n_time)``, tail velocity ``(3, n_time)``, and power dissipated by
-    friction ``(1, n_time)``."""
-
     rates: Array
     z: Array
     power: Array
@@ -51,7 +48,6 @@ def momenta(body: Chain, posture: Posture, link: LinkVelocity) -> Array:
 
 
 def kinetic_energy(body: Chain, angles: Array, rates: Array, z: Array) -> Array:
-    """Kinetic energy of a body of mass 1, ``(1, n_time)``."""
     link = body.velocity(body.posture(angles), rates, z)
     twice = body.mass_column() * (link.vs**2 + link.vn**2) + body.inertia_column() * link.w**2
     return 0.5 * namespace(link.vs).sum_rows(twice)
@@ -69,7 +65,7 @@ def inertial_moments(
 
 
 def tail_velocity(body: Chain, angles: Array, rates: Array, states: Array) -> Array:
-    """Tail velocity ``(3, n_time)`` of a chain with momenta `states`, ``(3, n_time)``."""
+    """Tail velocity of a chain with momenta `states`."""
     posture = body.posture(angles)
     x, y = body.centre_of_mass(posture)
     left = states - momenta(body, posture, body.velocity(posture, rates, 0 * states))
@@ -91,7 +87,7 @@ def momentum_rates(
     delta: Array,
     froude: Array,
 ) -> MomentumRates:
-    """Rates of the momenta `states` ``(3, n_time)`` under friction; NumPy and CasADi."""
+    """Rates under friction; NumPy and CasADi."""
     z = tail_velocity(body, angles, rates, states)
     slides = body.sliding(friction, angles, rates, z, delta)
     growth = about_centre(body, angles, slides.force) / froude + turning(z, states)
@@ -107,13 +103,12 @@ def about_centre(body: Chain, angles: Array, force: Array, sign: float = 1.0) ->
 
 
 def turning(z: Array, states: Array) -> Array:
-    """Rates of the momenta ``(3, n_time)`` because their axes turn with the tail link."""
+    """Rates of the momenta because their axes turn with the tail link."""
     omega = z[2:3, :]
     return namespace(z, states).stack([omega * states[1:2, :], -omega * states[0:1, :], 0 * omega])
 
 
 def checked_mass(body: Body) -> Chain:
-    """The body as a chain, or a `ProblemError`: only its parts have masses."""
     if not isinstance(body, Chain) or type(body).solve is not Chain.solve:
         raise ProblemError(
             f"inertia is known of a Chain, whose links have masses, not of a {type(body).__name__}."

@@ -49,8 +49,7 @@ class Law(Protocol):
     def label(self) -> str:
         """A short name with its numbers."""
 
-    def describe(self) -> str:
-        """A description for reports."""
+    def describe(self) -> str: ...
 
     def in_units_of(self, unit: float) -> Law:
         """The law with forces divided by `unit`."""

@@ -89,14 +89,12 @@ def library() -> ctypes.CDLL | None:
 
 
 def with_signatures(library: ctypes.CDLL, signatures: dict[str, str]) -> ctypes.CDLL:
-    """A library whose functions take a chain (`_CHAIN`) and arguments of these types (`_TYPES`)."""
     for name, types in signatures.items():
         getattr(library, name).argtypes = [_TYPES[each] for each in _CHAIN + types]
     return library
 
 
 def built_kernel(sources: Path) -> ctypes.CDLL | None:
-    """The library that was built of these very sources, if there is one."""
     now = hashlib.sha256(
         b"".join(file.read_bytes() for file in sorted(sources.glob("*.[ch]")))
     ).hexdigest()

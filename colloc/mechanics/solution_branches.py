@@ -5,19 +5,32 @@ several balances exist, a link rests in one of them, or nearly; so solving from 
 finds them. Far away the net force opposes the velocity, so the signs of the determinant of minus
 its derivative add up to 1 over all solutions (the degree of the map). The slightest inertia leaves
 a motion of negative sign.
+
+A body with a little inertia stays on its branch until that ends in a fold, and then jumps. So a
+gait may run through one shape in two ways; both differ by no more than the solutions do, instant by
+instant.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from colloc.mechanics.balance import TAIL, Moving, balance_jacobian
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.damped_newton import groups
+from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
+from colloc.system.errors import NotConvergedError
 
+FORWARDS, BACKWARDS = 1, -1
+_SAME = 1e-5  # relative difference of velocities that are one
 DISTINCT = 1e-5
 """Difference of distinct velocities, in units of the largest rate."""
 _TOLERANCE, _ACCEPTED = 1e-12, 1e-11
@@ -42,12 +55,12 @@ class Branches(NamedTuple):
 
     @property
     def number(self) -> np.ndarray:
-        """Number of solutions, ``(n_time,)``; 0 where the solver failed."""
+        """Number of solutions; 0 where the solver failed."""
         return (self.sign != 0).sum(axis=0)
 
     @property
     def complete(self) -> np.ndarray:
-        """Whether the signs add up to 1, as they do over all solutions, ``(n_time,)``."""
+        """Whether the signs add up to 1, as they do over all solutions."""
         return self.sign.sum(axis=0) == 1
 
 
@@ -90,7 +103,6 @@ def all_balanced_velocities(
 
 
 def _largest_rate(rates: np.ndarray) -> np.ndarray:
-    """Unit of velocities, ``(n_time,)``."""
     return np.maximum(np.abs(rates).max(axis=0), np.finfo(float).tiny)
 
 
@@ -163,3 +175,97 @@ def _replace(
     z[:, :, chosen], sign[:, chosen] = np.nan, 0.0
     z[: len(there.z), :, chosen], sign[: len(there.z), chosen] = there
     return Branches(z, sign)
+
+
+def followed_motion(
+    at: Instants,
+    quantities: Sequence[Quantity] = (),
+    *,
+    before: np.ndarray | None = None,
+    sense: int = FORWARDS,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tail velocities ``(3, n_time)`` of the branch that a chain follows where its law may allow
+    several, and the spread of velocities of the centre of mass, rotation rates, powers and k
+    quantities among the stable solutions, ``(3 + k, n_time)``.
+
+    Instants are those of one period in order of time, followed with or against it (`sense`), or
+    such that tail velocities shortly before are known (`before`, ``(3, n_time)``).
+    """
+    found = all_balanced_velocities(at.body, at.friction, at.angles, at.rates, at.delta)
+    if not found.number.all():
+        lost = int((found.number == 0).sum())
+        raise NotConvergedError(
+            f"no velocity that balances the body was found at {lost} of {found.number.size} "
+            f"instants."
+        )
+    z, several = found.z[0].copy(), np.flatnonzero(found.number > 1)
+    apart = np.zeros((3 + len(quantities), z.shape[1]))
+    if several.size:
+        some = Branches(found.z[:, :, several], found.sign[:, several])
+        apart[:, several] = _ranges(at.take(several), some, quantities)
+    for now, previous in _order(found.number > 1, sense):
+        last = z[:, previous] if before is None else before[:, now]
+        z[:, now] = _nearest(found.z[:, :, now], found.sign[:, now], last)
+    return z, apart
+
+
+def on_one_branch(
+    body: Body, friction: Law, angles: np.ndarray, rates: np.ndarray, delta: float, z: np.ndarray
+) -> np.ndarray:
+    """Tail velocities ``(3, n_time)`` continued in time, from balanced ones that were solved for
+    one by one.
+
+    Each is solved for again from the one before, round the period, until none changes; of those
+    that change, the nearest stable solution is taken. Where none changes, z itself is returned.
+    """
+    if friction.associated or not isinstance(body, Chain):
+        return z
+    followed, at, moves = z.copy(), np.arange(z.shape[1]), np.zeros(z.shape[1], dtype=bool)
+    for _ in range(2 * z.shape[1]):
+        found = body.solve(
+            friction, angles[:, at], rates[:, at], delta, start=followed[:, at - 1]
+        ).z
+        moved = np.abs(found - followed[:, at]).max(axis=0) > _SAME * np.abs(z).max()
+        if not moved.any():
+            break
+        followed[:, at[moved]], moves[at[moved]] = found[:, moved], True
+        # what comes after these began at another velocity
+        at = (at[moved] + 1) % z.shape[1]
+    if not moves.any():
+        return z
+    # a step from a branch that ends may come to a motion that does not last
+    chosen = np.flatnonzero(moves)
+    chosen = np.roll(chosen, -int(np.searchsorted(chosen, np.argmin(moves))))
+    all_of = all_balanced_velocities(body, friction, angles[:, chosen], rates[:, chosen], delta)
+    for k, now in enumerate(chosen):
+        if all_of.number[k]:
+            followed[:, now] = _nearest(all_of.z[:, :, k], all_of.sign[:, k], followed[:, now - 1])
+    return followed
+
+
+def _order(several: np.ndarray, sense: int) -> Iterator[tuple[int, int]]:
+    """(instant, instant before) of those with several motions, from one with a single one on."""
+    certain = np.flatnonzero(~several)
+    first = certain[0] if certain.size else 0
+    for previous, now in pairwise((first + sense * np.arange(several.size + 1)) % several.size):
+        if several[now]:
+            yield now, previous
+
+
+def _nearest(z: np.ndarray, sign: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Solution nearest to a velocity ``(3,)``, among the stable ones if there are any."""
+    distance = np.abs(z - before[:, None].T).max(axis=1)
+    stable = np.where(sign > 0, distance, np.inf)
+    return z[np.nanargmin(stable if np.isfinite(stable).any() else distance)]
+
+
+def _ranges(at: Instants, found: Branches, quantities: Sequence[Quantity]) -> np.ndarray:
+    rows = []
+    for z, sign in zip(found.z, found.sign, strict=True):
+        now = at.body.sliding(at.friction, at.angles, at.rates, z, at.delta)
+        row = np.concatenate(
+            [now.centre, z[2:], now.power, *(each.at(replace(at, z=z)) for each in quantities)]
+        )
+        rows.append(np.where(sign > 0, row, np.nan))
+    apart = np.nanmax(rows, axis=0) - np.nanmin(rows, axis=0)
+    return np.stack([np.hypot(apart[0], apart[1]), *apart[2:]])

@@ -32,11 +32,10 @@ from scipy.interpolate import CubicHermiteSpline
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.limits import range_of
 from colloc.laws.resistance import Elliptic
-from colloc.mechanics.axle import Axle
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.mechanics.floor_contact import whole_links
-from colloc.mechanics.friction import Friction
+from colloc.mechanics.friction import Axle, Friction
 from colloc.mechanics.inertia import GRAVITY
 from colloc.mechanics.law import Law, rate_independent
 from colloc.pictures import render
@@ -53,7 +52,8 @@ from colloc.results.solution import Solution
 from colloc.system.arguments import check_count, checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import write_text
-from colloc.verification.differential_motion import GaitWithInertia, inertial_motion
+from colloc.verification.differential_motion import GaitWithInertia
+from colloc.verification.replay import replay
 from colloc.verification.trajectory import (
     MOST_SAMPLES,
     Approach,
@@ -368,10 +368,11 @@ def _write_model(robot: RobotSheet, path: Path) -> dict[str, Any]:
             for foot in chain.standing_on
         )
         with suppress(*_UNKNOWN):
-            facts["moves_body_lengths_per_period"] = inertial_motion(
+            facts["moves_body_lengths_per_period"] = replay(
                 replace(chain, feet=feet) if chain.feet else chain, _in_mujoco(law), solution.gait,
-                solution.delta_per_period, robot.froude, tolerance=1e-3, turn=solution.rotation,
-                breaks=solution.gait.corner_phases, regime=problem.regime,
+                solution.delta_per_period, tolerance=1e-3, turn=solution.rotation,
+                breaks=solution.gait.corner_phases,
+                regime=replace(problem.regime, froude=robot.froude, free=None),
             ).distance  # fmt: skip
     return facts | ({"note": note} if note else {})
 

@@ -38,7 +38,7 @@ from colloc.search.optimise import delta_levels, with_kink
 from colloc.search.options import COARSE, MEDIUM, OPTIONS, TOLERANCES, max_rounds
 from colloc.transcription.full_program import ACTUATORS, AT_LEAST, FullProgram
 from colloc.transcription.layout import balanced_variables, distance_and_work, layout_of
-from colloc.verification.refinement import plan_mesh
+from colloc.verification.mesh_error import plan_mesh
 
 
 @checkpoint

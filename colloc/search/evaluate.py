@@ -33,7 +33,7 @@ from colloc.search.iterate import evaluate_at
 from colloc.search.options import OPTIONS, TOLERANCES, settings
 from colloc.smooth.prescribed_body import schedule
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.verification.refinement import plan_mesh
+from colloc.verification.mesh_error import plan_mesh
 
 
 def evaluate(

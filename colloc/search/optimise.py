@@ -6,7 +6,7 @@ the last gait, until constraints, trust region and gait settle. Pairs of links m
 are constrained only once they cross (a cutting-plane method): a chain of n links has (n - 2)(n -
 3)/2 such pairs, and few of them ever come near each other.
 
-Every mesh is planned as a whole for the gait at hand (`colloc.verification.refinement`), a smooth
+Every mesh is planned as a whole for the gait at hand (`colloc.verification.mesh_error`), a smooth
 body's panels with it, and the gait optimised on it, until it needs no other.
 """
 
@@ -40,7 +40,7 @@ from colloc.search.options import (
 )
 from colloc.smooth.smooth_body import on_panels, panels_of
 from colloc.system.errors import NotConvergedError
-from colloc.verification.refinement import AIM, MOST_POINTS, plan_mesh
+from colloc.verification.mesh_error import AIM, MOST_POINTS, plan_mesh
 
 
 def solve_subproblems(

@@ -28,8 +28,7 @@ is that of a slope. With inertia the momenta P of the body take the place of N a
 with x_i the midpoints seen from the centre of mass; where torques count they follow from
 q'', variables too, and the momenta (`colloc.dynamics.chain`). Other bodies, and the formulation
 "implicit velocity", have shape coordinates q, rates r and tail velocity z as variables, and z =
-Z(q, r), the velocity that balances them, in place of friction and balance
-(`colloc.transcription.velocity_map`).
+Z(q, r), the velocity that balances them, in place of friction and balance.
 
 Inequalities are the limits of the shape, each at the worst instant of the mesh cells in which it
 may bind for a given gait; what actuators can do, at every point; and the mean shape speed. Every
@@ -41,7 +40,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import casadi as ca
@@ -53,19 +52,88 @@ from colloc.dynamics.collocated import closing_sign, momenta_image
 from colloc.dynamics.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.period import chord_per_way
-from colloc.mechanics.bodies import FULL
+from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.contact import Pairs
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.friction import LinkForce, line_integrals
 from colloc.mechanics.inertia import STATES, turning
-from colloc.numerics.repeated import Program, Repeated
+from colloc.mechanics.law import Law
+from colloc.numerics.repeated import LocalFunction, Program, Repeated
+from colloc.numerics.sqp import keep_last
 from colloc.transcription.layout import RADIANS, balanced_variables, layout_of
 from colloc.transcription.shape_constraints import ShapeLimits
-from colloc.transcription.velocity_map import BalancedVelocity, velocity_map
 
 ACTUATORS, AT_LEAST, SHAPE_SPEED = "actuators", "at least", "shape speed"
 _Shape = tuple[ca.SX, ca.SX, ca.SX | None, ca.SX | None]
 """Joint angles, rates and moments of a point."""
+
+
+_TOLERANCE, _ACCEPTED = 1e-12, 1e3
+"""Tolerance, and the factor on it where rounding stops the solver."""
+
+
+@lru_cache(maxsize=32)
+def velocity_map(body: Body, law: Law, *, relative: bool = False) -> LocalFunction:
+    """Local functions of (theta, q, r, z): z - Z, velocities of the centre of mass, power at Z. The
+    balance, a step function of z as delta goes to 0, does not converge as a constraint."""
+    sizes = (("theta", 1), ("q", body.n_joint), ("r", body.n_joint), ("z", 3), ("delta", 1))
+    theta, q, r, z, delta = (ca.SX.sym(name, size) for name, size in sizes)
+    solved, slow = ca.SX.sym("Z", 3), delta * ca.norm_2(r) if relative else delta
+    balanced = body.sliding(law, q, r, solved, slow)
+    centre, c, s = body.sliding(law, q, r, z, slow).centre, ca.cos(theta), ca.sin(theta)
+    ahead, aside = c * centre[0] - s * centre[1], s * centre[0] + c * centre[1]
+    out = ca.vertcat(z - solved, ahead, aside, balanced.power)
+    local = ca.vertcat(theta, q, r, z)
+    return LocalFunction(local, ca.SX(0, 1), delta, out, solved, balanced.force)
+
+
+class BalancedVelocity(ca.Callback):
+    """(angles, rates, start, delta) to balanced tail velocities ``(3, n_time)``, cached; NaN where
+    the balance does not converge."""
+
+    def __init__(self, body: Body, friction: Law, n_time: int) -> None:
+        ca.Callback.__init__(self)
+        self._body, self._friction = body, friction
+        sizes = (body.n_joint, n_time), (body.n_joint, n_time), (3, n_time), (1, 1)
+        self._inputs = [ca.Sparsity.dense(*size) for size in sizes]
+        self._z, self._start, self.solves = np.full((3, n_time), np.nan), np.empty(0), 0
+        self._balanced = keep_last(self._solve)
+        self.construct("velocity_map", {"enable_fd": False})
+
+    def of_local(self, local: ca.MX, delta: ca.MX, *, relative: bool) -> ca.MX:
+        ends = np.cumsum([1, self._body.n_joint, self._body.n_joint]).tolist()
+        _, q, r, start = ca.vertsplit(local, [0, *ends, local.shape[0]])
+        if not relative:
+            return self(q, r, start, delta)
+        speed = ca.sqrt(ca.sum1(r * r))  # Z grows like r and delta
+        unit, start = (each / ca.repmat(speed, each.size1(), 1) for each in (r, start))
+        return ca.repmat(speed, 3, 1) * self(q, unit, start, delta)
+
+    def get_n_in(self) -> int:
+        return len(self._inputs)
+
+    def get_sparsity_in(self, index: int) -> ca.Sparsity:
+        return self._inputs[index]
+
+    def get_sparsity_out(self, index: int) -> ca.Sparsity:
+        return self._inputs[2]
+
+    def eval(self, arguments: list[ca.DM]) -> list[ca.DM]:
+        angles, rates, self._start = (a.full() for a in arguments[:3])
+        at = np.concatenate([angles.ravel(), rates.ravel(), [float(arguments[3])]])
+        return [
+            ca.DM(self._balanced(at) if np.isfinite(at).all() else np.full_like(self._z, np.nan))
+        ]
+
+    def _solve(self, at: np.ndarray) -> np.ndarray:
+        angles, rates = at[:-1].reshape(2, self._body.n_joint, -1)
+        start = self._z if np.isnan(self._start).any() else self._start
+        solved = self._body.solve(
+            self._friction, angles, rates, at[-1], start=np.nan_to_num(start), tolerance=_TOLERANCE
+        )
+        self.solves += 1
+        self._z = np.where(solved.residual < _ACCEPTED * _TOLERANCE, solved.z, np.nan)
+        return self._z
 
 
 class FullProgram(Program):
@@ -292,7 +360,6 @@ class FullProgram(Program):
         return (ca.exp(-2.0 * pace) if pace.size1() else self.dynamics.regime.froude) * RADIANS**2
 
     def _function_of_body(self) -> None:
-        """Add the velocity map at the points."""
         layout, body, law = self.layout, self.dynamics.body, self.dynamics.law
         self.velocity = BalancedVelocity(body, law, self.mesh.n_point)
         theta = layout.theta[:, self.sites]
@@ -303,7 +370,7 @@ class FullProgram(Program):
         self.point = self.add_repeated(Repeated(function, gather, values, solve))
 
     def _at_points(self, formula: Any) -> np.ndarray:
-        """Values of a formula at every point, ``(n_value, n_point)``."""
+        """Values at every point, ``(n_value, n_point)``."""
         variables, shape = self._shape(formula.needs_forces)
 
         def value(*local: ca.SX) -> ca.SX:
@@ -316,7 +383,7 @@ class FullProgram(Program):
         return self.repeat(value, variables)
 
     def _shape(self, with_moments: bool) -> tuple[list[np.ndarray], Callable[..., _Shape]]:
-        """Variables of a point; and joint angles, rates, moments and Froude number from them."""
+        """Variables of a point, and a function from them to `_Shape`."""
         layout = self.layout
         if layout.z.size:
             return [layout.angles, layout.rates], lambda q, r: (q, r, None, None)
@@ -335,11 +402,9 @@ class FullProgram(Program):
         return [*links, layout.accelerations, *self._momenta_and_pace()], shape
 
     def _spread(self, matrix: np.ndarray) -> sparse.csr_matrix:
-        """A matrix over parts, applied at every point."""
         return sparse.csr_matrix(sparse.kron(matrix, sparse.eye(self.mesh.n_point)))
 
     def _on_links(self, output: int) -> sparse.csr_matrix:
-        """Sum over the contacts of each link."""
         links, total = np.array(self.chain.contact.links), 0
         for rows, outputs in self.contacts:
             to_links = 1.0 * (links[rows] == np.arange(self.chain.n_link)[:, None])
@@ -347,7 +412,6 @@ class FullProgram(Program):
         return total
 
     def _add_motion(self, angles: Any, rates: Any, offset: np.ndarray) -> None:
-        """The equations of a gait with such angles, but for the offset, and rates."""
         layout, pick = self.layout, self.pick
         if layout.z.size:
             self.add("angles", pick(layout.angles) - angles, offset, offset)
@@ -428,7 +492,7 @@ class FullProgram(Program):
         self.add("orientation", rows, even, even)
 
     def _ways(self) -> tuple[Any, Any, Any]:
-        """Rows of the velocities ahead and across, and of the power, at the points."""
+        """Rows of the velocities ahead and across, and of the power."""
         if self.layout.z.size:
             return tuple(self.pick(self.point[k]) for k in (3, 4, 5))
         mass, angle = self._spread(self.chain.mass_column().T), self.dynamics.regime.ahead

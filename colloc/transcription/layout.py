@@ -124,7 +124,7 @@ def layout_of(control: ControlProblem, mesh: Mesh) -> Layout:
 def distance_and_work(
     control: ControlProblem, layout: Layout, x: np.ndarray
 ) -> tuple[float, float]:
-    """Distance and work of a period in the problem's units; a gait that turns has its chord."""
+    """Distance and work of a period in the problem's units."""
     way, work = (
         float(x[row[0, -1]]) / control.admissible.fraction for row in (layout.distance, layout.work)
     )

@@ -12,12 +12,12 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from colloc.dynamics.branches import on_one_branch
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import Period, chord_per_way
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law
+from colloc.mechanics.solution_branches import on_one_branch
 from colloc.numerics.schemes import Scheme, scheme
 from colloc.system.errors import NotConvergedError
 
@@ -59,8 +59,8 @@ def rates_at(
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> Rates:
-    """Solve for the velocities of a path at phases t, from tail velocities `near` ``(3, ...)``;
-    without them at ascending phases, on one branch in time where several motions are balanced."""
+    """Velocities of a path at phases t, from tail velocities `near` ``(3, ...)``; without them at
+    ascending phases, on one branch in time where several motions are balanced."""
     angles, rates = path(t.ravel())
     at = body, friction, angles, rates, delta
     if near is None:
@@ -82,15 +82,15 @@ def totals_along(
     h = (right - left) / pieces
     starts = left[:, None] + h[:, None] * np.arange(pieces)
     t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
-    driven = getattr(path, "driven", path)
-    densities = quantity.of_shapes(*driven(t.ravel()))[0].reshape(t.shape)
+    shapes: Any = None, None, *getattr(path, "driven", path)(t.ravel()), 0.0
+    densities = np.asarray(quantity.at(Instants(*shapes)))[0].reshape(t.shape)
     return h * (densities @ PANEL_RULE.b).sum(axis=1)
 
 
 def whole_totals(
     quantities: Iterable[Quantity], path: Path
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Totals over a period of quantities that need no forces, and their errors."""
+    """Totals of quantities that need no forces, and their errors."""
     values, errors = {}, {}
     for each in [each for each in quantities if not each.needs_forces]:
         value, rougher = (
@@ -113,8 +113,6 @@ def increments(
 
 @dataclass(frozen=True, eq=False)
 class FineMotion:
-    """The motion of a gait over its solved part."""
-
     edges: np.ndarray  # of panels, (n + 1,)
     rates: Rates  # at the panel nodes, (n, s)
     theta: np.ndarray  # orientation at the edges
@@ -129,19 +127,19 @@ class FineMotion:
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 
     def _locate(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Panels of phases, fractions of these, and the lengths of all panels."""
+        """Panels of phases, fractions of these, lengths of all panels."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
         h = np.diff(self.edges)
         return k, (t - self.edges[k]) / h[k], h
 
     def velocity(self, t: np.ndarray) -> np.ndarray:
-        """Tail velocities ``(3, ...)`` at phases t by the panels' polynomials."""
+        """Tail velocities ``(3, ...)`` by the panels' polynomials."""
         k, fraction, _ = self._locate(t)
         weights = PANEL_RULE.lagrange(fraction.ravel()).reshape(*t.shape, -1)
         return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Orientation, displacement, work and quantities at phases t ``(n_time,)``."""
+        """Orientation, displacement, work and quantities ``(n_time,)``."""
         k, fraction, h = self._locate(t)
         weights = PANEL_RULE.integrals(fraction) * h[k][:, None]
         omega = self.rates.z[2]
@@ -231,7 +229,6 @@ def fine_motion(
 
 
 def _cumulative(parts: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Orientation, lab displacement, and work and quantities at the edges."""
     totals = [np.append(0.0, np.cumsum(part)) for part in parts[2:]]
     return *poses(*parts[:2]), np.stack(totals)
 
@@ -262,6 +259,10 @@ class Replay(Period):
     across: float = 0.0  # on a slope the way across the direction that counts
     multipliers: tuple[complex, ...] = ()
     """By what small changes of the momenta are multiplied in a period with inertia."""
+    states: np.ndarray = field(default_factory=lambda: np.empty((7, 0)), compare=False)
+    """With inertia: Vx, Vy, H (`colloc.mechanics.inertia`), the tail link's orientation, the place
+    of the centre of mass, and the work up to there, at the phases of `tail` ``(7, n)``; seen from
+    axes that turn evenly."""
 
     def __repr__(self) -> str:
         value = f"{self.objective.short} = {self.value:.6g} +- {self.error * abs(self.value):.0e}"
@@ -278,6 +279,11 @@ class Replay(Period):
     @property
     def value(self) -> float:
         return self.objective(self.values)
+
+    @property
+    def stable(self) -> bool:
+        """Whether motions beside this one come closer to it, period by period."""
+        return max(map(abs, self.multipliers), default=0.0) < 1.0
 
     @property
     def ambiguity(self) -> float:

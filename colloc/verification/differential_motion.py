@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -27,19 +27,12 @@ import numpy as np
 
 from colloc.dynamics.chain import MomentaAt, balance_on_slope, joint_torques
 from colloc.dynamics.follow import ONE_SIDED, STEP, Course, integrate_period
-from colloc.gaits.objective import EFFICIENCY, Objective
-from colloc.gaits.period import Period, chord_per_way
+from colloc.gaits.objective import Objective
+from colloc.gaits.period import chord_per_way
 from colloc.gaits.regime import LEVEL, Regime, checked_chain
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.densities import (
-    LENGTH,
-    Instants,
-    PathLimit,
-    PathLimits,
-    Quantity,
-    limits_of,
-    quantities_of,
-)
+from colloc.mechanics.chain import Chain
+from colloc.mechanics.densities import Instants, PathLimits, Quantity
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.inertia import checked_mass, kinetic_energy, momenta, tail_velocity
 from colloc.mechanics.law import Law
@@ -54,7 +47,6 @@ from colloc.verification.adaptive_motion import (
     fine_motion,
     lever,
     to_tolerance,
-    whole_totals,
 )
 
 _UNITS = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 100.0])
@@ -95,49 +87,67 @@ def _through_periods(
     return phases, states, np.stack(ends, axis=1)
 
 
-def _forced(quantities: Iterable[Quantity]) -> list[Quantity]:
-    return [each for each in dict.fromkeys(quantities) if each.needs_forces]
+class _Gait:
+    """A gait of a chain whose motion has states."""
 
+    def __init__(
+        self, body: Chain, friction: Law, path: Path, delta: float, breaks: _Breaks,
+        quantities: Iterable[Quantity],
+    ) -> None:  # fmt: skip
+        self.body, self.friction, self.path, self.delta = body, friction, path, delta
+        self.breaks = tuple(sorted(map(float, breaks)))
+        self.quantities = [each for each in dict.fromkeys(quantities) if each.needs_forces]
 
-def _sums(
-    seen: Callable[[np.ndarray], Instants],
-    quantities: list[Quantity],
-    steps: np.ndarray,
-    aim: float,
-    ends: np.ndarray,
-) -> np.ndarray:
-    """Quantities of what is seen up to ascending phases, ``(k, n)``: by Gauss quadrature between
-    steps, which are halved where that changes more than an error, as at kinks of a power."""
-    found = np.zeros((len(quantities), ends.size + 1))
-    if not quantities:
-        return found[:, 1:]
+    def instants(self, t: np.ndarray, states: np.ndarray) -> Instants:
+        """Instants at phases where the motion has the states ``(n_state, n)``."""
+        raise NotImplementedError
 
-    def gained(edges: np.ndarray, h: np.ndarray) -> np.ndarray:
-        now = seen((edges[:, None] + h[:, None] * PANEL_RULE.c).ravel())
-        densities = np.stack([each.at(now).reshape(h.size, -1) for each in quantities])
-        return np.asarray(h * (densities @ PANEL_RULE.b))
+    def sums(self, ran: Course, aim: float, ends: np.ndarray = _END, motion: int = 0) -> np.ndarray:
+        """Quantities that need forces up to ascending phases, ``(k, n)``, by Gauss quadrature
+        between the steps of a run, which are halved where that changes more than an error, as at
+        kinks of a power."""
+        sums = np.zeros((len(self.quantities), ends.size + 1))
+        if not self.quantities:
+            return sums[:, 1:]
 
-    edges = np.union1d(np.union1d(steps, ends), 0.0)
-    left, h = edges[:-1], np.diff(edges)
-    whole = gained(left, h)
-    while left.size:
-        left, h = (left[:, None] + h[:, None] * [0.0, 0.5]).ravel(), np.repeat(0.5 * h, 2)
-        parts = gained(left, h)
-        both = parts[:, ::2] + parts[:, 1::2]
-        off = np.abs(both - whole).max(axis=0) > aim * np.maximum(2 * h[::2], _KINK)
-        off &= h[::2] > _NARROWEST
-        upto = np.searchsorted(ends, left[::2], side="right")
-        for row, part in zip(found, both, strict=True):
-            np.add.at(row, upto[~off], part[~off])
-        again = np.repeat(off, 2)
-        left, h, whole = left[again], h[again], parts[:, again]
-    return np.cumsum(found, axis=1)[:, :-1]
+        def gained(edges: np.ndarray, h: np.ndarray) -> np.ndarray:
+            t = (edges[:, None] + h[:, None] * PANEL_RULE.c).ravel()
+            now = self.instants(t, ran.at(t)[7 * motion :])
+            densities = np.stack([each.at(now).reshape(h.size, -1) for each in self.quantities])
+            return np.asarray(h * (densities @ PANEL_RULE.b))
+
+        edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
+        left, h = edges[:-1], np.diff(edges)
+        whole = gained(left, h)
+        while left.size:
+            left, h = (left[:, None] + h[:, None] * [0.0, 0.5]).ravel(), np.repeat(0.5 * h, 2)
+            parts = gained(left, h)
+            both = parts[:, ::2] + parts[:, 1::2]
+            off = np.abs(both - whole).max(axis=0) > aim * np.maximum(2 * h[::2], _KINK)
+            off &= h[::2] > _NARROWEST
+            upto = np.searchsorted(ends, left[::2], side="right")
+            for row, part in zip(sums, both, strict=True):
+                np.add.at(row, upto[~off], part[~off])
+            again = np.repeat(off, 2)
+            left, h, whole = left[again], h[again], parts[:, again]
+        return np.cumsum(sums, axis=1)[:, :-1]
+
+    def measured(
+        self, ran: Course, z: np.ndarray, values: Numbers, errors: Numbers, objective: Objective,
+        limits: PathLimits, **more: Any,
+    ) -> Replay:  # fmt: skip
+        """The record of a run through a period, at whose phases the tail's velocities are z."""
+        angles, _ = self.path(t := ran.phases % 1.0)
+        shares = np.empty(0)
+        if limits.names:  # of torques, perhaps, which are infinite at corners
+            shares = limits.sizes(limits.at(self.instants(t, ran.states))).max(axis=1)
+        error = float(objective.relative_error(values, errors))
+        more |= {"lever": lever(self.body, angles), "tail": (ran.phases, z), "shares": shares}
+        return Replay(values, errors, **more, objective=objective, error=error, instants=t.size)
 
 
 @dataclass(frozen=True, eq=False)
 class SlopeMotion:
-    """A gait on a slope, period by period."""
-
     grade: float  # tangent of the inclination
     course: float
     """Direction of the gait on the level, from that of the tail link at phase 0 [rad]."""
@@ -161,13 +171,11 @@ class SlopeMotion:
     all but theta from the first start, ``(6, n)``."""
 
     def __repr__(self) -> str:
-        count = (
-            f"{self.climb.size} period{'s' * (self.climb.size > 1)} on a grade of {self.grade:g}"
-        )
-        ends = f"heading {self.headings[0]:.4f} -> {self.headings[-1]:.4f}"
+        count = self.climb.size
         return (
-            f"<SlopeMotion of {count}: climb {self.climb.sum():.6g}, work of the joints "
-            f"{self.joint_work.sum():.6g}, {ends}>"
+            f"<SlopeMotion of {count} period{'s' * (count > 1)} on a grade of {self.grade:g}: "
+            f"climb {self.climb.sum():.6g}, work of the joints {self.joint_work.sum():.6g}, "
+            f"heading {self.headings[0]:.4f} -> {self.headings[-1]:.4f}>"
         )
 
     @property
@@ -181,26 +189,20 @@ class SlopeMotion:
         return bool(np.prod(self.steering) < 1.0)
 
 
-class GaitOnSlope:
-    """A gait of a chain on a slope."""
+class GaitOnSlope(_Gait):
+    """A gait of a chain in slow motion on a slope; its states are those of `SlopeMotion`."""
 
     def __init__(
-        self,
-        body: Body,
-        friction: Law,
-        path: Path,
-        delta: float,
-        grade: float,
-        breaks: _Breaks = (),
-    ) -> None:
-        self.body, self.slope = checked_chain(body, friction, grade), Regime(grade=float(grade))
-        self.friction, self.path, self.delta = friction, path, delta
-        self.breaks = tuple(sorted(map(float, breaks)))
+        self, body: Body, friction: Law, path: Any, delta: float, slope: Regime,
+        breaks: _Breaks = (), quantities: Iterable[Quantity] = (),
+    ) -> None:  # fmt: skip
+        chain, self.slope = checked_chain(body, friction, slope.grade), slope
+        super().__init__(chain, friction, path, delta, breaks, quantities)
 
     def integrate(
         self, begin: np.ndarray | float, tolerance: float, longest: float = np.inf
     ) -> Course:
-        """`SlopeMotion.states` through a period, from the first of them at its begin."""
+        """The states through a period, from the first of them at its begin."""
 
         def rates(
             t: float, state: np.ndarray, near: np.ndarray | None
@@ -221,20 +223,15 @@ class GaitOnSlope:
         start = np.append(begin, np.zeros(6 - np.size(begin)))
         return integrate_period(rates, start, tolerance * _UNITS, self.breaks, longest)
 
-    def instants(self, phases: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
+    def balanced(self, t: np.ndarray, theta: np.ndarray) -> tuple[Instants, np.ndarray]:
         """Instants at phases and orientations ``(n,)``, and the residual of the balance."""
-        at = (self.body, self.friction, *self.path(phases), self.delta)
+        at = (self.body, self.friction, *self.path(t), self.delta)
         load = self.slope.pull(theta[None])
         solved = solve_balance(*at, load=load)
         return Instants(*at, z=solved.z, load=load), solved.residual
 
-    def totals(
-        self, ran: Course, aim: float, quantities: Iterable[Quantity], ends: np.ndarray = _END
-    ) -> np.ndarray:
-        """Totals of quantities that need forces up to ascending phases, ``(k, n)``, to an error."""
-        return _sums(
-            lambda t: self.instants(t, ran.at(t)[0])[0], _forced(quantities), ran.phases, aim, ends
-        )
+    def instants(self, t: np.ndarray, states: np.ndarray) -> Instants:
+        return self.balanced(t, states[0])[0]
 
     def several(self, phases: np.ndarray, theta: np.ndarray) -> float:
         """Part of the time at which several motions are balanced."""
@@ -243,6 +240,35 @@ class GaitOnSlope:
         at = (self.body, self.friction, *self.path(phases % 1.0), self.delta)
         several = all_balanced_velocities(*at, self.slope.pull(theta[None])).number > 1
         return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
+
+    def replay(
+        self, objective: Objective, tolerance: float, known: Any, limits: PathLimits, instants: int
+    ) -> Replay:
+        """A period of a gait that says where it points: the distance is the way in the direction
+        that counts, the work that of the joints."""
+
+        theta_0 = self.path.theta  # type: ignore[attr-defined]
+
+        def run(aim: float) -> tuple[tuple[Course, float], Numbers]:
+            ran = self.integrate(theta_0, aim, _LONGEST / instants)
+            theta, climb, aside, spent, *_ = (ran.states[:, -1] - ran.states[:, 0]).tolist()
+            way = self.slope.travel_along(complex(climb, aside))
+            work = spent + self.slope.grade * climb
+            numbers = {"distance": way.real, "work": work, "rotation": theta}
+            sums = zip(self.quantities, self.sums(ran, aim)[:, 0].tolist(), strict=True)
+            return (ran, way.imag), numbers | {each.name: total for each, total in sums}
+
+        first = _FIRST * tolerance
+        (ran, across), values, errors = to_tolerance(run, first, objective, tolerance, known)
+        now, residual = self.balanced(ran.phases % 1.0, ran.states[0])
+        return self.measured(
+            *(ran, now.z, values, errors, objective, limits),
+            others={},
+            actuator_work=float(ran.states[4, -1]),
+            residual=float(residual.max()),
+            several=self.several(ran.phases, ran.states[0]),
+            across=across,
+        )
 
 
 def slope_motion(
@@ -277,8 +303,7 @@ def slope_motion(
         positive to the left [rad]. Of a gait that goes nowhere on the level, the direction of its
         tail link at phase 0. By default 0, or of a solution's gait for a slope its own.
     theta : float, optional
-        The same by the direction of the tail link at phase 0 from straight uphill; instead of a
-        heading.
+        The same by the direction of the tail link at phase 0; instead of a heading.
     periods : int
     tolerance : float
         Of headings, ways and works over a period, about; what is left is stated
@@ -308,7 +333,7 @@ def slope_motion(
     [0.181] [1.041]
     [0.091] [1.048]
     """
-    on = GaitOnSlope(body, friction, gait, delta, grade, breaks)
+    on = GaitOnSlope(body, friction, gait, delta, Regime(grade=grade), breaks)
     if heading is None and theta is None:
         theta = getattr(gait, "theta", None)
     check_finite(heading=0.0 if heading is None else heading, theta=0.0 if theta is None else theta)
@@ -322,91 +347,11 @@ def slope_motion(
         _through_periods(partial(on.integrate, tolerance=aim), start, periods)
         for aim in (_LOOSER * tolerance, tolerance)
     )
-    climb, aside, friction_work, joint_work, steering = np.diff(ends[1:])
+    *ways, steering = np.diff(ends[1:])
     error = float(np.abs(states[:5, -1] - loose[:5, -1]).max())
-    several = on.several(phases, states[0])
-    ways = climb, aside, friction_work, joint_work
-    return SlopeMotion(
-        on.slope.grade, course, ends[0] + course, *ways, np.exp(steering), error, several, phases,
-        states,
-    )  # fmt: skip
-
-
-def slope_replay(
-    body: Body,
-    friction: Law,
-    gait: Any,
-    delta: float,
-    *,
-    slope: Regime,
-    instants: int = 1600,
-    tolerance: float = 1e-6,
-    breaks: _Breaks = (),
-    objective: Objective = EFFICIENCY,
-    quantities: Iterable[Quantity | str] = (),
-    limits: Iterable[PathLimit] | PathLimits = (),
-    **_: object,
-) -> Replay:
-    """A period of a gait that says where it points, with the arguments of `colloc.replay`: the
-    distance is the way in the direction that counts, the work that of the joints."""
-    asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
-    with_forces = _forced(asked)
-    totals = whole_totals(asked, gait)
-    on = GaitOnSlope(body, friction, gait, delta, slope.grade, breaks)
-
-    def run(aim: float) -> tuple[tuple[Course, float], Numbers]:
-        ran = on.integrate(gait.theta, aim, _LONGEST / instants)
-        theta, climb, aside, spent, *_ = ran.states[:, -1] - ran.states[:, 0]
-        way, work = slope.travel_along(complex(climb, aside)), float(spent + slope.grade * climb)
-        numbers = {"distance": way.real, "work": work, "rotation": float(theta)}
-        sums = on.totals(ran, aim, with_forces)[:, 0].tolist()
-        names = (each.name for each in with_forces)
-        return (ran, way.imag), numbers | dict(zip(names, sums, strict=True))
-
-    first = _FIRST * tolerance
-    (ran, across), values, errors = to_tolerance(run, first, objective, tolerance, totals)
-    limits, phases = limits_of(limits, body.n_joint), ran.phases % 1.0
-    now, residual = on.instants(phases, ran.states[0])
-    return Replay(
-        values=values,
-        errors=errors,
-        others={},
-        lever=lever(body, now.angles),
-        actuator_work=float(ran.states[4, -1]),
-        residual=float(residual.max()),
-        error=float(objective.relative_error(values, errors)),
-        several=on.several(ran.phases, ran.states[0]),
-        instants=phases.size,
-        tail=(phases, now.z),
-        shares=limits.sizes(limits.at(now)).max(axis=1) if limits.names else np.empty(0),
-        objective=objective,
-        across=across,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class InertialMotion(Period):
-    """A period of a gait with inertia that leaves the momenta as they are; the work is that against
-    friction [weight x length]."""
-
-    froude: float  # L/(g T^2)
-    multipliers: np.ndarray = field(repr=False)
-    """By what small changes of the momenta are multiplied in a period (Floquet multipliers)."""
-    phases: np.ndarray = field(repr=False)
-    """Phases ``(n,)`` where the solver stepped."""
-    states: np.ndarray = field(repr=False)
-    """Vx, Vy, H (`colloc.mechanics.inertia`), the tail link's orientation, the place of the centre
-    of mass, and the work up to there, ``(7, n)``; seen from axes that turn evenly."""
-
-    @property
-    def error(self) -> float:
-        """Relative error of the efficiency."""
-        return self.error_of(EFFICIENCY)
-
-    @property
-    def stable(self) -> bool:
-        """Whether motions beside this one come closer to it, period by period."""
-        return bool(np.abs(self.multipliers).max() < 1.0)
+    several: Any = on.several(phases, states[0]), phases, states
+    seen = float(grade), course, ends[0] + course, *ways, np.exp(steering), error
+    return SlopeMotion(*seen, *several)
 
 
 class RoughPeriod(NamedTuple):
@@ -434,29 +379,21 @@ class PeriodicRun(NamedTuple):
         return np.concatenate([self.course.states[:, [0, -1]], sums])
 
 
-class GaitWithInertia:
-    """A gait of a chain at a Froude number; on a slope orientations are from straight uphill."""
+class GaitWithInertia(_Gait):
+    """A gait of a chain at a Froude number; on a slope orientations are from straight uphill. Its
+    states are `Replay.states`."""
 
     def __init__(
-        self,
-        body: Body,
-        friction: Law,
-        gait: Path,
-        delta: float,
-        *,
-        froude: float,
-        breaks: _Breaks = (),
-        turn: float = 0.0,
-        regime: Regime = LEVEL,
+        self, body: Body, friction: Law, path: Path, delta: float, *, froude: float,
+        breaks: _Breaks = (), turn: float = 0.0, regime: Regime = LEVEL,
         quantities: Iterable[Quantity] = (),
-    ) -> None:
-        self.body, self.path, self.quantities = checked_mass(body), gait, _forced(quantities)
-        if self.quantities and len(breaks):
+    ) -> None:  # fmt: skip
+        super().__init__(checked_mass(body), friction, path, delta, breaks, quantities)
+        if self.quantities and self.breaks:
             name = self.quantities[0].name
             raise ProblemError(f"torques are infinite where joint rates jump: leave {name} out.")
-        self.friction, self.delta, self.froude = friction, delta, float(froude)
-        self.breaks, self.turn, self.regime = tuple(sorted(map(float, breaks))), turn, regime
-        self.theta = float(getattr(gait, "theta", None) or 0.0)  # of the tail link at first
+        self.froude, self.turn, self.regime = float(froude), turn, regime
+        self.theta = float(getattr(path, "theta", None) or 0.0)  # of the tail link at first
         self._rough = min(_ROUGH, 0.1 * delta / STEP)
         self._momenta_of = lru_cache(partial(MomentaAt, self.body, friction, delta, self.froude))
 
@@ -470,8 +407,8 @@ class GaitWithInertia:
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 
     def run(self, start: np.ndarray, aim: float) -> Course:
-        """`InertialMotion.states` through a period from a state ``(7,)``, momenta ``(3,)`` at the
-        origin, or several states ``(n, 7)``, with the same steps."""
+        """The states through a period from a state ``(7,)``, momenta ``(3,)`` at the origin, or
+        several states ``(n, 7)``, with the same steps."""
         if start.shape == (3,):
             start = np.append(start, [self.theta, 0.0, 0.0, 0.0])
 
@@ -489,16 +426,11 @@ class GaitWithInertia:
 
         return integrate_period(rates, start.ravel(), aim, self.breaks)
 
-    def sums(self, ran: Course, aim: float, ends: np.ndarray = _END, motion: int = 0) -> np.ndarray:
-        """Quantities that need forces up to ascending phases, ``(k, n)``, to an error."""
-
-        def seen(t: np.ndarray) -> Instants:
-            of, delta = (self.body, self.friction), self.delta
-            at = *of, self.path, t, ran.at(t)[7 * motion :][_MOMENTA]
-            moments = joint_torques(*at, delta=delta, froude=self.froude)
-            return Instants(*of, *self.path(t), delta, moments=moments, froude=self.froude)
-
-        return _sums(seen, self.quantities, ran.phases, aim, ends)
+    def instants(self, t: np.ndarray, states: np.ndarray) -> Instants:
+        of = self.body, self.friction
+        how: Any = {"delta": self.delta, "froude": self.froude}
+        moments = joint_torques(*of, self.path, t, states[_MOMENTA], **how)
+        return Instants(*of, *self.path(t), moments=moments, **how)
 
     def totals(self, states: np.ndarray) -> Numbers:
         """Distance, joints' work, rotation and quantities from the first of states to the last."""
@@ -524,7 +456,6 @@ class GaitWithInertia:
         return np.stack([begin[0], end[0]], axis=1), (end[1:] - end[0]).T / _APART
 
     def rough_period(self, near: np.ndarray) -> RoughPeriod:
-        """A period near some momenta that leaves them as they are."""
         start = near
         for _ in range(_MOST_STEPS):
             ends, slopes = self.period_map(start)
@@ -588,6 +519,59 @@ class GaitWithInertia:
         changed = [self.totals(np.column_stack([start, end + each])) for each in off.T]
         return {x: sum(abs(other[x] - value) for other in changed) for x, value in totals.items()}
 
+    def replay(
+        self, objective: Objective, tolerance: float, known: Any, limits: PathLimits,
+        near: Replay | None,
+    ) -> Replay:  # fmt: skip
+        """The period that leaves the momenta as they are, on a slope as of `slope_motion`.
+
+        A body from rest may come to another motion: then the gait has several. The joints' work is
+        that against friction and what the body gains in kinetic energy.
+        """
+        check_finite(positive=True, froude=self.froude, delta=self.delta)
+        begin = None if near is None else self.momenta(near.tail_velocity(np.zeros(1)))
+        start, ends, slopes = self.find_period(begin)
+        period = {"period": self.froude**-0.5}
+
+        def run(aim: float) -> tuple[PeriodicRun, Numbers]:
+            nonlocal start
+            ran = self.periodic_run(start, aim, slopes)
+            start = ran.momenta
+            return ran, self.totals(ran.ends) | period
+
+        # runs that cannot be the last but one are left out
+        usual = self.changes(ends, slopes, np.full(len(ends), _USUAL * tolerance), np.zeros(3))
+        lost = objective.relative_error(self.totals(ends) | period | known[0], usual)
+        first = tolerance / max(1.0, lost / tolerance)
+        errors_of = partial(self.errors, slopes=slopes)
+        ran, values, errors = to_tolerance(run, first, objective, tolerance, known, errors_of)
+        phases, states, _ = ran.course
+        from_rest = states[_MOMENTA, 0]
+        if near is None or near.several:
+            with suppress(NotConvergedError):  # Newton's method need not lead to any from there
+                from_rest = self.rough_period(np.zeros(3)).momenta
+        several = float(np.abs(from_rest - states[_MOMENTA, 0]).max() > _OTHER)
+        others: Numbers = {}
+        if several:
+            other = self.run(from_rest, tolerance)
+            sums = self.sums(other, tolerance)[:, 0]
+            there = self.totals(PeriodicRun(other, from_rest, tolerance, sums).ends)
+            others = {name: abs(value - values[name]) for name, value in there.items()}
+        shapes = self.body, *self.path(phases % 1.0)
+        z = tail_velocity(*shapes, states[_MOMENTA])
+        energy = self.froude * kinetic_energy(*shapes, z)[0]
+        change = states[:, -1] - states[:, 0]
+        return self.measured(
+            *(ran.course, z, values, errors, objective, limits),
+            others=others,
+            actuator_work=values["work"] + float(energy[-1] - energy[0]),
+            residual=float(np.abs(change[_MOMENTA]).max()),
+            several=several,
+            across=self.regime.travel_along(complex(*change[_PLACE])).imag,
+            multipliers=tuple(map(complex, np.linalg.eigvals(slopes[_MOMENTA]))),
+            states=states,
+        )
+
 
 def amplification(slopes: np.ndarray) -> np.ndarray:
     """Derivatives ``(7 + k, 3)`` of the end of a period by what each adds to the momenta."""
@@ -598,169 +582,11 @@ def _newton_step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     return np.linalg.solve(np.eye(3) - slopes[_MOMENTA], gap)
 
 
-def inertial_motion(
-    body: Body,
-    friction: Law,
-    gait: Path,
-    delta: float,
-    froude: float,
-    *,
-    tolerance: float = 1e-5,
-    breaks: _Breaks = (),
-    objective: Objective = EFFICIENCY,
-    turn: float = 0.0,
-    quantities: Iterable[Quantity | str] = (),
-    regime: Regime = LEVEL,
-    near: np.ndarray | None = None,
-) -> InertialMotion:
-    """Move a body by a gait with inertia, once it has settled to a motion in which all periods are
-    alike.
-
-    Parameters
-    ----------
-    body : Chain
-        With the masses of its links.
-    friction : Law
-    gait : callable
-        Joint angles and rates at phases in [0, 1]; any gait of colloc. Its pace within the period
-        counts.
-    delta : float
-        Regularisation speed, per period.
-    froude : float
-        Froude number L/(g T^2), above 0: 0.0255 for a body of 1 m in 2 s. What counts is its ratio
-        to the friction coefficient.
-    tolerance : float
-        Relative error of the objective.
-    breaks : (n,), optional
-        Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
-    objective : Objective
-        Of distance, work, rotation, period [sqrt(length / gravity)] and quantities.
-    turn : float
-        Net rotation that the gait is asked for [rad]: the distance is the chord of an arc that
-        turns by as much.
-    quantities : iterable of Quantity or str
-        Further quantities, as ``["driven_work"]``.
-    regime : Regime
-        On a slope `problem.regime`, or `colloc.gaits.regime.Regime`: the gait says where it points,
-        distance and work are as of `colloc.slope_motion`.
-    near : (3,), optional
-        Momenta at phase 0 to begin with, as those of another delta; then as if the gait were played
-        slowly, or else at rest.
-
-    Raises
-    ------
-    ProblemError
-        If the body is no chain, or numbers are out of range.
-    NotConvergedError
-        If no such motion is found, or rounding hides the accuracy that is asked for.
-
-    Examples
-    --------
-    >>> import colloc
-    >>> gait = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
-    >>> played = colloc.inertial_motion(colloc.Chain(), colloc.Friction(), gait, delta=1e-2,
-    ...     froude=0.1, tolerance=1e-3)
-    >>> round(played.efficiency, 3), played.stable
-    (0.136, True)
-    """
-    check_finite(positive=True, froude=froude, delta=delta)
-    asked = dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)])
-    how: Any = {"froude": froude, "breaks": breaks, "turn": turn, "regime": regime}
-    moving = GaitWithInertia(body, friction, gait, delta, quantities=asked, **how)
-    start, ends, slopes = moving.find_period(near)
-    totals = whole_totals(asked, gait)
-    period = {"period": float(froude) ** -0.5}
-
-    def run(aim: float) -> tuple[PeriodicRun, Numbers]:
-        nonlocal start
-        ran = moving.periodic_run(start, aim, slopes)
-        start = ran.momenta
-        return ran, moving.totals(ran.ends) | period
-
-    # runs that cannot be the last but one are left out
-    usual = moving.changes(ends, slopes, np.full(len(ends), _USUAL * tolerance), np.zeros(3))
-    lost = objective.relative_error(moving.totals(ends) | period | totals[0], usual)
-    first = tolerance / max(1.0, lost / tolerance)
-    errors_of = partial(moving.errors, slopes=slopes)
-    ran, values, errors = to_tolerance(run, first, objective, tolerance, totals, errors_of)
-    multipliers, (phases, states, _) = np.linalg.eigvals(slopes[_MOMENTA]), ran.course
-    return InertialMotion(values, errors, {}, froude, multipliers, phases, states)
-
-
-def inertial_replay(
-    body: Body,
-    friction: Law,
-    gait: Path,
-    delta: float,
-    *,
-    regime: Regime,
-    tolerance: float = 1e-6,
-    breaks: _Breaks = (),
-    objective: Objective = EFFICIENCY,
-    turn: float = 0.0,
-    quantities: Iterable[Quantity | str] = (),
-    limits: PathLimits | None = None,
-    near: Replay | None = None,
-    **_: object,
-) -> Replay:
-    """`inertial_motion` with the arguments of `colloc.replay`, at the pace of the regime.
-
-    A body from rest may come to another motion: then the gait has several. The joints' work is that
-    against friction and what the body gains in kinetic energy.
-    """
-    regime = regime.at(gait)
-    how: Any = {"froude": regime.froude, "breaks": breaks, "turn": turn, "regime": regime}
-    asked = [*objective.integrals, *quantities_of(quantities)]
-    moving = GaitWithInertia(body, friction, gait, delta, quantities=asked, **how)
-    begin = None if near is None else moving.momenta(near.tail_velocity(np.zeros(1)))
-    how |= {"tolerance": tolerance, "objective": objective, "quantities": quantities}
-    ran = inertial_motion(body, friction, gait, delta, near=begin, **how)
-    phases, states, chain = ran.phases % 1.0, ran.states, moving.body
-    from_rest = states[_MOMENTA, 0]
-    if near is None or near.several:
-        with suppress(NotConvergedError):  # Newton's method need not lead to any from there
-            from_rest = moving.rough_period(np.zeros(3)).momenta
-    several = float(np.abs(from_rest - states[_MOMENTA, 0]).max() > _OTHER)
-    others: Numbers = {}
-    if several:
-        other = moving.run(from_rest, tolerance)
-        sums = moving.sums(other, tolerance)[:, 0]
-        there = moving.totals(PeriodicRun(other, from_rest, tolerance, sums).ends)
-        others = {name: abs(value - ran.values[name]) for name, value in there.items()}
-    angles, rates = moving.path(phases)
-    z = tail_velocity(chain, angles, rates, states[_MOMENTA])
-    energy = regime.froude * kinetic_energy(chain, angles, rates, z)[0]
-    change = states[:, -1] - states[:, 0]
-    shares = np.empty(0)
-    if limits is not None and limits.names:
-        at: Any = {"delta": delta, "froude": regime.froude}
-        moments = joint_torques(chain, friction, moving.path, phases, states[_MOMENTA], **at)
-        of = chain, friction, angles, rates, delta
-        now = Instants(*of, moments=moments, froude=regime.froude)
-        shares = limits.sizes(limits.at(now)).max(axis=1)
-    return Replay(
-        values=ran.values,
-        errors=ran.errors,
-        others=others,
-        lever=lever(chain, angles),
-        actuator_work=ran.work + float(energy[-1] - energy[0]),
-        residual=float(np.abs(change[_MOMENTA]).max()),
-        error=ran.error_of(objective),
-        several=several,
-        instants=phases.size,
-        tail=(phases, z),
-        objective=objective,
-        across=regime.travel_along(complex(*change[_PLACE])).imag,
-        shares=shares,
-        multipliers=tuple(map(complex, ran.multipliers)),
-    )
-
-
 class FromRest(NamedTuple):
     """Periods of a gait that a body with inertia begins at rest."""
 
     phases: np.ndarray  # where the solver stepped, (n,), from 0 to the number of periods
-    states: np.ndarray  # there, as in `InertialMotion`, (7, n)
+    states: np.ndarray  # there, as `Replay.states`, (7, n)
     periods: np.ndarray  # distance, work and rotation of each period, (n_period, 3)
 
 
@@ -784,8 +610,14 @@ def motion_from_rest(
 
     Parameters
     ----------
-    body, friction, gait, delta, froude, breaks
-        As of `inertial_motion`.
+    body : Chain
+        With the masses of its links.
+    friction, gait, breaks
+        As of `colloc.slope_motion`. The gait's pace within the period counts.
+    delta : float
+        Regularisation speed, per period.
+    froude : float
+        Froude number L/(g T^2), above 0.
     periods : int
     tolerance : float
         About the error of the states after a period.
@@ -815,8 +647,8 @@ def motion_from_rest(
     check_finite(positive=True, froude=froude, delta=delta, tolerance=tolerance)
     check_count(MOST_PERIODS, periods=periods)
     check_finite(grade=grade, theta=theta)
-    how: Any = {"froude": froude, "breaks": breaks}
-    moving = GaitWithInertia(body, friction, gait, delta, regime=Regime(grade=float(grade)), **how)
+    how: Any = {"froude": froude, "breaks": breaks, "regime": Regime(grade=float(grade))}
+    moving = GaitWithInertia(body, friction, gait, delta, **how)
     start = np.array([0.0, 0.0, 0.0, theta, 0.0, 0.0, 0.0])
     phases, states, ends = _through_periods(partial(moving.run, aim=tolerance), start, periods)
     change = np.diff(ends)

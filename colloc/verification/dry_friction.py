@@ -50,8 +50,6 @@ class Between(NamedTuple):
 
 
 class DryFriction(NamedTuple):
-    """A period under dry friction."""
-
     distance: Between
     work: Between
     open: float
@@ -70,7 +68,6 @@ class DryFriction(NamedTuple):
         return f"d/W between {least:.8f} and {most:.8f}, at {self.instants} instants{several}"
 
     def facts(self) -> dict:
-        """As plain numbers (JSON)."""
         intervals = {name: list(getattr(self, name)) for name in ("efficiency", "distance", "work")}
         return {**intervals, "open": self.open, "instants": self.instants}
 

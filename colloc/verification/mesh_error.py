@@ -1,11 +1,16 @@
-"""Errors of a collocated gait, interval by interval, and the motion that meshes are held against.
+"""Errors of a collocated gait, interval by interval, and meshes refined to a requested one.
 
 On an interval the scheme takes the rate of a state to be the polynomial through its values at the
 nodes; the integral of the *defect*, that polynomial less the true rate, is the error it adds.
+
+A gait can be tried on any mesh, so a mesh is planned as a whole: knots are *moved* onto the kinks
+where links begin to stick or slip, intervals with the largest errors are *split*, for schemes with
+*more nodes* too, of which the mesh with the fewest points wins.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,20 +21,56 @@ import numpy as np
 from colloc.dynamics.chain import joint_torques
 from colloc.dynamics.collocated import CollocatedPose, stage_weights
 from colloc.dynamics.control_problem import Admissible, ControlProblem
-from colloc.dynamics.dynamics import OMEGA, Inertial, PeriodTotals, QuasiStatic, Shapes, Trajectory
+from colloc.dynamics.dynamics import OMEGA, Inertial, PeriodTotals, Shapes, Trajectory
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.limits import under_one_limit
 from colloc.gaits.symmetry import NONE
+from colloc.mechanics.bodies import Body
+from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, far_pairs
 from colloc.mechanics.inertia import STATES
+from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
-from colloc.numerics.schemes import Scheme
-from colloc.verification.adaptive_motion import LEAST, fine_motion, rates_at, totals_along
+from colloc.numerics.schemes import Scheme, scheme
+from colloc.verification.adaptive_motion import (
+    LEAST,
+    FineMotion,
+    Path,
+    fine_motion,
+    rates_at,
+    totals_along,
+)
 from colloc.verification.differential_motion import GaitOnSlope, GaitWithInertia, amplification
 
 FINER = 0.05
 """What the panels may miss, over the error they measure or the tolerance."""
 _SAMPLES = 32
+VIOLATION = 5e-7
+"""Violation of a joint limit or of self-contact that needs no refinement [rad, body lengths]."""
+TURNING = 5e-5
+"""Rotation that collocation may miss, times reach over distance: half of what certificates
+allow."""
+MOST_POINTS = 12_000
+AIM = 0.4
+"""Planned error over the request: the gait, and its kinks with it, will still move."""
+_GOOD = 0.9
+"""Error over the request of a mesh that is good already: the answer may still move the gait."""
+_MORE_NODES, _MOST_NODES = (0, 2, 4), 9
+_HANDICAP = 1.1  # of another order, which starts the optimiser anew
+_SNAP = 0.3
+_COARSE, _A_HARMONIC = 16, 2  # least intervals of a coarse mesh, a period and a harmonic
+GRADE = 0.2
+"""Where an interval with a kink at one end is cut, over its length: velocities go like x log|x|,
+and cutting in the middle costs schemes of high order twice the points."""
+_ONE_KINK = 0.02 / 16
+"""Part of the solved period within which kinks share a knot: 2 % of a first mesh's spacing."""
+_LEFT = 0.2  # mean intervals by which a kink may have moved from the knot that it left
+_NARROWEST = 1e-7
+_WORST = 0.1  # of the largest error: with states, intervals below it are not cut
+_SLOW = 30.0
+"""A point counts as at rest below this many delta."""
+_ZOOMS, _PLACES = 5, 9
+_SEPARATE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +129,8 @@ def gait_motion(
             body, law, gait, delta, mesh.edges, tolerance, control.aims.objective,
             quantities=control.aims.integrals, turn=kind.turn, periods=kind.periods,
         )  # fmt: skip
-    on_mesh = _collocate(control, mesh, gait, delta)
-    counts = sum(map(abs, control.aims.objective.shares(on_mesh.period).values()))
+    _, along, _, _, period = _collocate(control, mesh, gait, delta)
+    counts = sum(map(abs, control.aims.objective.shares(period).values()))
     error = tolerance / counts if np.isfinite(counts) else tolerance
     if hasattr(regime, "reference"):
         return regime.reference(control, gait, delta, mesh, error)
@@ -98,17 +139,16 @@ def gait_motion(
         paced = regime.at(gait)
         how: Any = {"froude": paced.froude, "turn": kind.turn, "regime": paced}
         moving = GaitWithInertia(body, law, gait, delta, quantities=asked, **how)
-        begin, _, slopes = moving.rough_period(on_mesh.along.edges[:, 0])
+        begin, _, slopes = moving.rough_period(along.edges[:, 0])
         times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
         run = moving.periodic_run(begin, max(error / times, LEAST), slopes)
         by_interval = kind.solve_intervals  # type: ignore[attr-defined]
         sums = partial(moving.sums, run.course, run.aim)
         return ReferenceMotion(run.course.at, times * run.aim, sums, by_interval)
     if regime.slides:
-        on = GaitOnSlope(body, law, gait, delta, regime.grade, gait.corner_phases)
+        on = GaitOnSlope(body, law, gait, delta, regime, gait.corner_phases, asked)
         ran = on.integrate(gait.theta, error)
-        sums = partial(on.totals, ran, error, asked)
-        return ReferenceMotion(lambda t: ran.at(t)[:4], error, sums)
+        return ReferenceMotion(lambda t: ran.at(t)[:4], error, partial(on.sums, ran, error))
     raise NotImplementedError(
         f"no differential equation is known for {type(regime).__name__}: give it a reference."
     )
@@ -130,19 +170,18 @@ def mesh_error(
     violation = constraint_violation(control.admissible, mesh, gait)
     if kind.followed:
         return MeshError(**_errors_with_states(known, mesh), violation=violation)
-    cells, objective = _collocated_cells(known, mesh.scheme, *_ends(mesh)), control.aims.objective
-    seen = _period(known, cells.pose.place[-1], cells.pose.theta[-1], cells.totals)[1]
+    value, turning, pose, gained = _collocated_cells(
+        known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:]
+    )
+    objective, rotation = control.aims.objective, pose.theta[-1] - kind.turn
+    _, seen = _period(control, pose.place[-1], rotation, gained)
     return MeshError(
-        value=cells.value,
+        value=value,
         violation=violation,
         total=objective(seen) / objective(_exact(known)[1]) - 1,
         unresolved=float(fine.unresolved.sum()),
-        turning=abs(float(cells.turning.sum())),
+        turning=abs(float(turning.sum())),
     )
-
-
-def _ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    return mesh.edges[:-1], mesh.edges[1:]
 
 
 def _first_order(
@@ -151,37 +190,30 @@ def _first_order(
     period: Mapping[str, float],
     rotation: np.ndarray,
     displacement: np.ndarray,
-    work: np.ndarray,
-    integrals: Iterable[np.ndarray],
+    gained: np.ndarray,
 ) -> np.ndarray:
-    """Relative changes of the objective by errors of intervals; `displacement` at the end."""
+    """Relative changes of the objective by errors of intervals: `displacement` at the end, `gained`
+    work and integrals ``(1 + k, n)``."""
     kind, weights = control.dynamics, control.aims.objective.shares(period)
     value = np.zeros(rotation.size)
     for name, share in kind.total_gradients(passed).items():
         way = (np.conj(share.side) * displacement).real
-        value += weights.get(name, 0.0) * (way + share.rotation * rotation + share.work * work)
-    for each, error in zip(control.aims.integrals, integrals, strict=True):
+        value += weights.get(name, 0.0) * (way + share.rotation * rotation + share.work * gained[0])
+    for each, error in zip(control.aims.integrals, gained[1:], strict=True):
         value += weights[each.name] * kind.periods * error
     return value
 
 
-class _Cells(NamedTuple):
-    """Intervals by a scheme, with their errors."""
-
-    value: np.ndarray
-    turning: np.ndarray
-    pose: CollocatedPose
-    totals: np.ndarray  # work and integrals, (1 + k,)
-
-
-def _collocated_cells(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> _Cells:
+def _collocated_cells(
+    known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, CollocatedPose, np.ndarray]:
+    """What intervals add to the error of the objective and to the turning; pose, work and integrals
+    ``(1 + k,)``."""
     (control, gait, delta, fine), h = known, right - left
-    nodes = left[:, None] + h[:, None] * rule.c
-    kind = control.dynamics
-    rates = rates_at(
-        kind.body, kind.law, gait, delta, nodes, near=fine.velocity(nodes),
-        quantities=control.aims.integrals, turn=kind.turn,
-    )  # fmt: skip
+    nodes, kind = left[:, None] + h[:, None] * rule.c, control.dynamics
+    how: Any = {"quantities": control.aims.integrals, "turn": kind.turn}
+    near = fine.velocity(nodes)
+    rates = rates_at(kind.body, kind.law, gait, delta, nodes, near=near, **how)
     pose = CollocatedPose(rule, h, rates.z[2], rates.centre)
     totals = (h[:, None] * rule.b * rates.gained).sum(axis=2)
     (theta, path, *before), (theta_right, path_right, *after) = fine.at(left), fine.at(right)
@@ -190,64 +222,43 @@ def _collocated_cells(known: Known, rule: Scheme, left: np.ndarray, right: np.nd
     displacement = pose.displacements * np.exp(1j * theta) - (path_right - path)
     # an error of rotation turns everything after it
     added = displacement + 1j * rotation * (fine.path[-1] - path_right)
-    value = _first_order(control, *_exact(known), rotation, added, gained[0], gained[1:])
+    value = _first_order(control, *_exact(known), rotation, added, gained)
     closed = control.admissible.gait.symmetry != NONE
     turning = rotation * (0.0 if closed else 0.5 / abs(fine.path[-1]))
-    return _Cells(value, turning, pose, totals.sum(axis=1))
+    return value, turning, pose, totals.sum(axis=1)
 
 
 def interval_shares(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Magnitudes of what intervals add to the relative error of the objective and to the
     turning."""
-    cells = _collocated_cells(known, rule, left, right)
-    return np.abs(cells.value) + np.abs(cells.turning)
+    value, turning, *_ = _collocated_cells(known, rule, left, right)
+    return np.abs(value) + np.abs(turning)
 
 
 def _period(
-    known: Known, end: complex, rotation: float, totals: np.ndarray
+    control: ControlProblem, end: complex, rotation: float, gained: np.ndarray, static: Any = ()
 ) -> tuple[PeriodTotals, dict[str, float]]:
-    """The solved part, and quantities of the period."""
-    kind = known.control.dynamics
-    passed = PeriodTotals(complex(end), float(rotation) - kind.turn, float(totals[0]))
-    names = (each.name for each in known.control.aims.integrals)
-    return passed, _period_of(kind, passed, dict(zip(names, totals[1:], strict=True)))
+    """The solved part, and quantities of the period, from work and integrals ``(1 + k,)``."""
+    kind, (work, *sums) = control.dynamics, gained.tolist()
+    passed = PeriodTotals(complex(end), float(rotation), work, static)
+    more = zip(control.aims.integrals, sums, strict=True)
+    return passed, kind.totals(passed) | {each.name: kind.periods * total for each, total in more}
 
 
 def _exact(known: Known) -> tuple[PeriodTotals, dict[str, float]]:
-    fine = known.fine
-    return _period(known, fine.path[-1], fine.theta[-1], fine.totals[:, -1])
-
-
-def _period_of(
-    kind: QuasiStatic, passed: PeriodTotals, sums: Mapping[str, Any]
-) -> dict[str, float]:
-    """Quantities of a period from those of the solved part."""
-    totals = {name: kind.periods * float(np.sum(part)) for name, part in sums.items()}
-    return kind.totals(passed) | totals
-
-
-class _Collocated(NamedTuple):
-    """A gait on a mesh."""
-
-    shapes: Shapes
-    along: Trajectory
-    pose: CollocatedPose
-    work: np.ndarray  # against friction, (n,)
-    integrals: dict[str, np.ndarray]  # of intervals
-    period: dict[str, float]
+    fine, turn = known.fine, known.control.dynamics.turn
+    return _period(known.control, fine.path[-1], fine.theta[-1] - turn, fine.totals[:, -1])
 
 
 def _collocate(
-    control: ControlProblem,
-    mesh: Mesh,
-    gait: Any,
-    delta: float,
-    near_states: np.ndarray | None = None,
-) -> _Collocated:
+    control: ControlProblem, mesh: Mesh, gait: Any, delta: float, near: np.ndarray | None = None
+) -> tuple[Shapes, Trajectory, CollocatedPose, np.ndarray, dict[str, float]]:
+    """A gait on a mesh: work and integrals of intervals ``(1 + k, n)``, quantities of the
+    period."""
     kind, weights = control.dynamics, stage_weights(mesh)
     angles, rates = gait(mesh.times)
     shapes = Shapes(angles, rates, delta)
-    along = kind.simulate(mesh, shapes, kind.static_of(gait), near_states)
+    along = kind.simulate(mesh, shapes, kind.static_of(gait), near)
     theta = kind.initial_heading(along.static)
     pose = CollocatedPose.on_mesh(mesh, along.now.z[OMEGA] - kind.turn, along.now.centre, theta)
     now = kind.instants(shapes, pose.theta_on(mesh), along.now.z)
@@ -255,38 +266,31 @@ def _collocate(
         how: Any = {"delta": delta, "froude": kind.froude_at(shapes, along.static)}
         at = kind.chain, kind.law, gait, mesh.times, along.states[: len(STATES)]
         now = replace(now, moments=joint_torques(*at, **how), froude=how["froude"])
-    work = (weights * along.now.power[mesh.points]).sum(axis=1)
-    sums = {
-        each.name: (weights * each.at(now)[0, mesh.points]).sum(axis=1)
-        for each in control.aims.integrals
-    }
-    way, turn = complex(pose.place[-1]), float(pose.rotations.sum())
-    passed = PeriodTotals(way, turn, float(work.sum()), along.static)
-    return _Collocated(shapes, along, pose, work, sums, _period_of(kind, passed, sums))
+    densities = along.now.power, *(each.at(now)[0] for each in control.aims.integrals)
+    gained = np.array([(weights * each[mesh.points]).sum(axis=1) for each in densities])
+    totals = pose.place[-1], pose.rotations.sum(), gained.sum(axis=1), along.static
+    return shapes, along, pose, gained, _period(control, *totals)[1]
 
 
 def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
-    """`MeshError` but for the violation."""
     (control, gait, delta, exact), kind = known, known.control.dynamics
     # momenta, perhaps theta
     at_edges, near = exact.at(mesh.edges), exact.at(mesh.times)[: len(kind.states)]
-    aims, seen = control.aims, _collocate(control, mesh, gait, delta, near)
-    shapes, along, pose = seen[:3]
+    shapes, along, pose, gained, seen = _collocate(control, mesh, gait, delta, near)
+    objective = control.aims.objective
     angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
-    passed = PeriodTotals(
-        complex(x.sum(), y.sum()), float(theta.sum()), float(work.sum()), along.static
-    )
-    with_forces = iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
-    integrals = {
-        each.name: next(with_forces)
+    forced = iter([] if exact.sums is None else np.diff(exact.sums(mesh.edges), axis=1))
+    more = (
+        next(forced)
         if each.needs_forces
-        else totals_along(each, gait, *_ends(mesh), 4)
-        for each in aims.integrals
-    }
-    period = _period_of(kind, passed, integrals)
-    weights = aims.objective.shares(period)
-    rotation, energy = pose.rotations - theta, seen.work - work
+        else totals_along(each, gait, mesh.edges[:-1], mesh.edges[1:], 4)
+        for each in control.aims.integrals
+    )
+    true = np.array([work, *more])
+    totals = x.sum() + 1j * y.sum(), theta.sum(), true.sum(axis=1), along.static
+    passed, period = _period(control, *totals)
+    weights, rotation = objective.shares(period), pose.rotations - theta
     displacement = np.diff(pose.place) - (x + 1j * y)
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     by_states: Any = 0.0
@@ -295,7 +299,7 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
         out, ends, solved = exact.solve_intervals(mesh, shapes, along, states[:, :-1], near)
         local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
         rotation = local.rotations - theta
-        energy = (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1) - work
+        gained[0] = (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1)
         displacement = np.exp(1j * angle[:-1]) * local.displacements - (x + 1j * y)
         if not kind.states[3:]:  # an error of rotation turns everything after it
             path = place[0] + 1j * place[1]
@@ -305,11 +309,11 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
         counts = np.array([weights.get(name, 0.0) for name in shares])
         by_states = np.einsum("m,mkn,kn->n", counts, on_ends, ends - states[:, 1:])
         by_states[~solved] = 1.0
-    off = [seen.integrals[name] - part for name, part in integrals.items()]
-    value = by_states + _first_order(control, passed, period, rotation, displacement, energy, off)
+    off = gained - true
+    value = by_states + _first_order(control, passed, period, rotation, displacement, off)
     return {
         "value": value if along.held.all() else np.nan * value,
-        "total": float(aims.objective(seen.period) / aims.objective(period) - 1),
+        "total": float(objective(seen) / objective(period) - 1),
         "unresolved": float(exact.error * sum(map(abs, weights.values()))),
         "turning": turned if control.admissible.gait.symmetry == NONE else 0.0,
     }
@@ -326,3 +330,214 @@ def constraint_violation(admissible: Admissible, mesh: Mesh, gait: AnyGait) -> n
         *(near.excess(angles)[0] for near in body.contacts()),
     ]
     return np.maximum(np.max(rows, axis=0), 0.0).reshape(mesh.n, -1).max(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPlan:
+    scheme: str
+    edges: np.ndarray  # (n + 1,)
+    estimate: float  # relative error of the gait's value
+    reached: bool  # whether that is below the request
+    kept: np.ndarray  # phases that have to stay knots, as they split violating intervals
+
+    @property
+    def points(self) -> float:
+        rule = scheme(self.scheme)
+        return (self.edges.size - 1) * (rule.s - rule.left)
+
+
+def kink_phases(
+    body: Body, friction: Law, path: Path, delta: float, fine: FineMotion, apart: float = _SEPARATE
+) -> np.ndarray:
+    """Phases of kinks and jumps of a gait's velocities inside its solved part, ascending and
+    farther `apart`; delta is per period.
+
+    The balance changes like x log|x| where a link slides on with its centre of rotation inside,
+    like |x| when it comes to rest; where mu_f and mu_b differ, also where the tangential velocity
+    changes its sign; and where a balance ends in a fold, the body jumps. Smooth bodies, and drag,
+    make no kinks.
+    """
+
+    def slowness(t: np.ndarray, z: np.ndarray) -> np.ndarray:
+        if not (isinstance(body, Chain) and body.law(friction).regularised):
+            return np.empty((0, t.size))
+        angles, rates = path(t)
+        velocity = body.velocity(body.posture(angles), rates, z)
+        return body.contact.sticking_speeds(friction, velocity)
+
+    t, velocity = fine.nodes.ravel(), fine.rates.z.reshape(3, -1)
+    speed = slowness(t, velocity)
+    inner = speed[:, 1:-1]
+    link, index = np.nonzero((inner <= speed[:, :-2]) & (inner <= speed[:, 2:]))
+    centre, least = t[index + 1], inner[link, index]
+    radius, rows = np.maximum(t[index + 2] - centre, centre - t[index]), np.arange(centre.size)
+    for _ in range(_ZOOMS if centre.size else 0):
+        near = centre[:, None] + radius[:, None] * np.linspace(-1, 1, _PLACES)
+        z = rates_at(body, friction, path, delta, near, near=fine.velocity(near)).z.reshape(3, -1)
+        sampled = slowness(near.ravel(), z)[np.repeat(link, _PLACES), np.arange(near.size)]
+        best = sampled.reshape(near.shape).argmin(axis=1)
+        centre, least = near[rows, best], sampled.reshape(near.shape)[rows, best]
+        radius *= 2.0 / (_PLACES - 1)
+    jumps = (np.abs(np.diff(velocity)).max(axis=0) > _SLOW * delta) & (np.diff(t) < _SEPARATE)
+    kinks = np.sort(np.concatenate([centre[least < _SLOW * delta], 0.5 * (t[1:] + t[:-1])[jumps]]))
+    kinks = kinks[(kinks > fine.edges[0] + _SEPARATE) & (kinks < fine.edges[-1] - _SEPARATE)]
+    kinks = kinks[np.diff(kinks, prepend=-np.inf) > _SEPARATE]
+    found: list[float] = []
+    for kink in kinks.tolist():
+        if not found or kink - found[-1] > apart:
+            found.append(kink)
+    return np.array(found)
+
+
+def move_knots(edges: np.ndarray, kinks: np.ndarray, snap: float = _SNAP) -> np.ndarray:
+    """Move the nearest inner knots onto the kinks; one farther than `snap` spacings gets its
+    own."""
+    free, spacing = edges[1:-1].copy(), np.median(np.diff(edges))
+    for kink in kinks:
+        if free.size:
+            nearest = int(np.argmin(np.abs(free - kink)))
+            if abs(free[nearest] - kink) < snap * spacing:
+                free = np.delete(free, nearest)
+    knots = np.unique(np.concatenate([edges[[0, -1]], free, kinks]))
+    keep = np.diff(knots, prepend=-np.inf) > _NARROWEST
+    keep[-1] = True
+    return knots[keep]
+
+
+def plan_mesh(
+    control: ControlProblem,
+    mesh: Mesh,
+    gait: AnyGait,
+    delta: float,
+    tolerance: float,
+    *,
+    kept: np.ndarray | None = None,
+    nested: bool = False,
+    aim: float = AIM,
+    most_points: int = MOST_POINTS,
+) -> MeshPlan | None:
+    """A mesh for a gait that was found on `mesh`, or None if that is good already.
+
+    The planned error is `aim` times the tolerance; the phases `kept` have to be knots; `nested`:
+    all knots of the mesh stay, so that a flat optimum has nowhere to come back to.
+    `NotConvergedError` without a balance.
+    """
+    fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
+    known = Known(control, gait, delta, fine)
+    error = mesh_error(control, mesh, gait, delta, tolerance, fine)
+    accurate = error.estimate <= _GOOD * tolerance and error.turning <= TURNING
+    if accurate and error.violation.max() <= VIOLATION:
+        return None
+    middles = 0.5 * (mesh.edges[1:] + mesh.edges[:-1])
+    knots = np.union1d(middles[error.violation > VIOLATION], [] if kept is None else kept)
+    if accurate:
+        edges = np.union1d(mesh.edges, knots)
+        return MeshPlan(mesh.scheme.name, edges, error.estimate, True, knots)
+    gaits, rules = control.admissible.gait, [scheme(control.scheme)]
+    if match := re.fullmatch(r"(gauss|radau)-(\d+)", control.scheme):
+        more = [rules[0].s + n for n in _MORE_NODES]
+        rules += [scheme(f"{match[1]}-{s}") for s in more[1:] if s <= _MOST_NODES]
+    asked: Any = {"kept": knots, "tolerance": tolerance, "aim": aim}
+    if control.dynamics.followed:
+        uniform = np.linspace(0.0, control.admissible.fraction, control.intervals + 1)
+        first = np.union1d(mesh.edges if nested else uniform, knots)
+        return _fewest(_halve(known, rule, first, budget=most_points, **asked) for rule in rules)
+    apart = _ONE_KINK * control.admissible.fraction
+    kinks = kink_phases(control.dynamics.body, control.dynamics.law, gait, delta, fine, apart)
+    # where the rates jump edges may be added, not moved
+    keeps = nested or gaits.relative_delta or not gaits.free
+    n = max(int(_COARSE * gaits.fraction), _A_HARMONIC * gaits.harmonics)
+    coarse = mesh.edges if keeps else np.linspace(mesh.edges[0], mesh.edges[-1], n + 1)
+    best: MeshPlan | None = None
+    for rule in rules:
+        # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself
+        # kinked
+        switches = not control.dynamics.law.reversible and (rule.left or rule.right)
+        targets = on_knots = kinks[:0] if switches else kinks
+        if on_knots.size:
+            # and the knots that the kinks have just left: collocation errs there in the optimiser's
+            # favour, and moving the knot after the kink repeats the chase
+            nearest = mesh.edges[np.abs(mesh.edges[:, None] - kinks).argmin(axis=0)]
+            just_left = np.abs(nearest - kinks) < _LEFT * np.diff(mesh.edges).mean()
+            targets = np.union1d(kinks, nearest[just_left])
+        edges = move_knots(np.union1d(coarse, knots), targets, 0.0 if keeps else _SNAP)
+        budget = most_points if best is None else min(most_points, best.points / _HANDICAP)
+        plan = _split(known, rule, edges, on_knots, budget=budget, **asked)
+        best = plan if best is None else _fewest([best, plan])
+    return best
+
+
+def _fewest(plans: Iterable[MeshPlan]) -> MeshPlan:
+    """The plan with the fewest points of those that reach the request; else the first."""
+    best, *others = plans
+    for plan in others:
+        if plan.reached and (not best.reached or plan.points * _HANDICAP < best.points):
+            best = plan
+    return best
+
+
+def _by_error(shares: np.ndarray, allowed: float) -> tuple[np.ndarray, int]:
+    """Intervals by falling error, and how many of them hold the excess over `allowed`."""
+    order = np.argsort(shares)[::-1]
+    return order, int((np.cumsum(shares[order]) < shares.sum() - allowed).sum())
+
+
+def _split(
+    known: Known,
+    rule: Scheme,
+    edges: np.ndarray,
+    kinks: np.ndarray,
+    *,
+    kept: np.ndarray,
+    tolerance: float,
+    aim: float,
+    budget: float,
+) -> MeshPlan:
+    """Cut the intervals with the largest errors, in the middle or near an end that is a kink."""
+    left, right = edges[:-1], edges[1:]
+    shares = interval_shares(known, rule, left, right)
+    unresolved = float(known.fine.unresolved.sum())
+    wanted = max(aim * tolerance - unresolved, 0.25 * aim * tolerance)
+    while shares.sum() > wanted and left.size * (rule.s - rule.left) < budget:
+        # half of those that hold the excess at a time: what they leave behind is not known yet
+        order, count = _by_error(shares, 0.3 * wanted)
+        chosen = order[: max(1, count // 2)]
+        chosen = chosen[right[chosen] - left[chosen] > 2 * _NARROWEST]
+        if chosen.size == 0:
+            break
+        a, b = left[chosen], right[chosen]
+        at_a, at_b = np.isin(a, kinks), np.isin(b, kinks)
+        middle = a + np.where(at_a & ~at_b, GRADE, np.where(at_b & ~at_a, 1 - GRADE, 0.5)) * (b - a)
+        new_left, new_right = np.concatenate([a, middle]), np.concatenate([middle, b])
+        new = interval_shares(known, rule, new_left, new_right)
+        left, right, shares = (
+            np.concatenate([np.delete(old, chosen), added])
+            for old, added in ((left, new_left), (right, new_right), (shares, new))
+        )
+    estimate = float(shares.sum() + unresolved)
+    edges = np.sort(np.append(left, right.max()))
+    return MeshPlan(rule.name, edges, estimate, estimate <= tolerance, kept)
+
+
+def _halve(
+    known: Known,
+    rule: Scheme,
+    edges: np.ndarray,
+    *,
+    kept: np.ndarray,
+    tolerance: float,
+    aim: float,
+    budget: float,
+) -> MeshPlan:
+    """Halve the intervals with the largest errors of a motion with states."""
+    control, gait, delta, fine = known
+    while True:
+        error = mesh_error(control, Mesh(rule, edges), gait, delta, tolerance, fine)
+        shares = np.abs(error.value)
+        small, full = shares.sum() <= aim * tolerance, edges.size * rule.s > budget
+        if small or full or np.isnan(shares).any():
+            return MeshPlan(rule.name, edges, error.estimate, error.estimate <= tolerance, kept)
+        order, count = _by_error(shares, 0.3 * aim * tolerance)
+        chosen = order[: max(1, count)]
+        chosen = chosen[shares[chosen] > _WORST * shares.max()]
+        edges = np.sort(np.concatenate([edges, 0.5 * (edges[chosen] + edges[chosen + 1])]))

@@ -3,7 +3,7 @@
 It shares nothing with collocation but the physics at an instant: velocities at five instants of
 panels, Simpson's rule on each and on its halves, and the error that leaves. Where several balance
 an instant, it follows one branch in time, and says how far the others would lead
-(`colloc.dynamics.branches`).
+(`colloc.mechanics.solution_branches`).
 
 A kink of stick and slip may lie where halving its panel changes nothing, and halving that again
 much. So a panel is also judged by what halving would change if it lay one or two instants earlier
@@ -13,33 +13,33 @@ or later, and the error follows from the falloff against the panel twice as wide
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.dynamics.branches import FORWARDS, followed_motion
 from colloc.dynamics.follow import ONE_SIDED
 from colloc.gaits.objective import EFFICIENCY, Objective
 from colloc.gaits.period import chord_per_way
-from colloc.gaits.regime import Regime
+from colloc.gaits.regime import LEVEL, Regime
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import (
     LENGTH,
     Instants,
-    PathLimit,
-    PathLimits,
+    Limits,
     Quantity,
     limits_of,
     quantities_of,
 )
 from colloc.mechanics.law import Law
+from colloc.mechanics.solution_branches import FORWARDS, followed_motion
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
-from colloc.verification.adaptive_motion import Path, Replay, lever, poses
-from colloc.verification.differential_motion import inertial_replay, slope_replay
+from colloc.verification.adaptive_motion import Path, Replay, lever, poses, whole_totals
+from colloc.verification.differential_motion import GaitOnSlope, GaitWithInertia
 
 MOST_INSTANTS = 10_000_000
 """Of a first grid, which fill a gigabyte."""
@@ -73,7 +73,7 @@ class Panels(NamedTuple):
     """Rotation rate from evenly turning axes, velocity of the centre of mass in the body frame,
     power, densities: complex, ``(n, 5, 3 + k)``."""
     joint_power: np.ndarray  # (n, 5)
-    apart: np.ndarray  # `colloc.dynamics.branches.FollowedMotion.apart`, (n, 5, 3 + k)
+    apart: np.ndarray  # as of `followed_motion`, (n, 5, 3 + k)
     wider: np.ndarray  # `changes` of the panel that each is half of, (n, 3 + k)
 
     def take(self, chosen: np.ndarray) -> Panels:
@@ -98,7 +98,7 @@ class Panels(NamedTuple):
 
 
 def first_panels(left: np.ndarray, width: np.ndarray, values: tuple[np.ndarray, ...]) -> Panels:
-    """An even number of equal panels between any two corners, with the changes of their pairs."""
+    """An even number of equal panels between any two corners."""
     paired = [np.concatenate([a[::2, ::2], a[1::2, 2::2]], axis=1) for a in values]
     pairs = Panels(left[::2], 2 * width[::2], *[*paired, np.empty(0)])
     return Panels(left, width, *[*values, np.repeat(changes(pairs)[0], 2, axis=0)])
@@ -184,9 +184,10 @@ def replay(
     sense: int = FORWARDS,
     objective: Objective = EFFICIENCY,
     quantities: Iterable[Quantity | str] = (),
-    limits: Iterable[PathLimit] | PathLimits = (),
+    limits: Limits = (),
     turn: float = 0.0,
     froude: float = 0.0,
+    regime: Regime = LEVEL,
 ) -> Replay:
     """Distance, work, rotation and length of a path over one period, to a relative error in the
     efficiency, or an objective.
@@ -221,8 +222,12 @@ def replay(
         Net rotation that the path is asked for [rad]: the distance is the chord of an arc that
         turns by as much.
     froude : float
-        Froude number L/(g T^2) at which the path is played; 0 is quasi-static motion. At another
-        one only `tolerance`, `breaks`, `objective`, `quantities` and `turn` count.
+        Froude number L/(g T^2) at which a chain is played, 0.0255 for 1 m in 2 s; what counts is
+        its ratio to the friction. 0 is quasi-static motion. With inertia the period is one that
+        leaves the momenta as they are (`Replay.stable`); instants and sense do not count.
+    regime : Regime
+        On a slope, as `problem.regime`: the gait says where it points, the distance is the way in
+        the direction that counts, the work that of the joints; gaits may say their pace.
 
     Raises
     ------
@@ -239,11 +244,18 @@ def replay(
     >>> round(measured.efficiency, 4)
     0.26
     """
-    if froude:
-        return inertial_replay(
-            body, friction, path, delta, regime=Regime(froude=froude), tolerance=tolerance,
-            breaks=breaks, objective=objective, quantities=quantities, turn=turn,
-        )  # fmt: skip
+    asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
+    joint_map = getattr(path, "joint_map", None)
+    limits = limits_of(limits, joint_map.n_motor if joint_map else body.n_joint)
+    regime = replace(regime, froude=froude, free=None) if froude else regime.at(path)
+    if not regime.slow_on_level:
+        of, paths = (body, friction, path, delta), whole_totals(asked, path)
+        how: Any = {"breaks": breaks, "quantities": asked}
+        if not regime.froude:
+            on = GaitOnSlope(*of, regime, **how)
+            return on.replay(objective, tolerance, paths, limits, instants)
+        moving = GaitWithInertia(*of, froude=regime.froude, turn=turn, regime=regime, **how)
+        return moving.replay(objective, tolerance, paths, limits, near)
     if "period" in objective.uses:
         raise ProblemError(
             f"the objective {objective.name!r} speaks of the period: give the froude at which it "
@@ -255,9 +267,6 @@ def replay(
             f"{instants!r}."
         )
     law = body.law(friction) if isinstance(body, Chain) else friction
-    asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
-    joint_map = getattr(path, "joint_map", None)
-    limits = limits_of(limits, joint_map.n_motor if joint_map else body.n_joint)
     residual, reach, shares = 0.0, 0.0, np.full(len(limits.names), -np.inf)
 
     def state_at(
@@ -267,14 +276,14 @@ def replay(
         ``(3, n k)``; of several motions the nearest, or of a `whole` period the branch in time."""
         nonlocal residual, reach, shares
         angles, rates = path(t.ravel())
-        at, before = (body, law, angles, rates, delta), None if whole else start
-        how: Any = {"quantities": asked, "joint_map": joint_map, "sense": sense}
-        followed = None if law.associated else followed_motion(*at, before=before, **how)
-        apart = np.zeros((3 + len(asked), t.size))
-        if followed is not None:
-            start, apart = np.nan_to_num(followed.z), followed.apart
+        at = body, law, angles, rates, delta
+        now, apart = Instants(*at, joint_map=joint_map), np.zeros((3 + len(asked), t.size))
+        if not law.associated and isinstance(body, Chain):
+            before = None if whole else start
+            start, apart = followed_motion(now, asked, before=before, sense=sense)
+            start = np.nan_to_num(start)
         motion, left_over = accurate_motion(*at, start)
-        now = Instants(*at, z=motion.z, joint_map=joint_map)
+        now = replace(now, z=motion.z)
         residual = float(np.maximum(residual, left_over.max()))
         reach = max(reach, lever(body, angles))
         if limits.names:
@@ -299,10 +308,9 @@ def replay(
     while True:
         spin, move, *sums = increments(panels)
         heading, place = poses(spin, move)
-        distance = max(chord * float(abs(place[-1])), 1e-300)
-        work, *totals = (float(part.sum()) for part in sums)
-        values = {"distance": distance, "work": work, "rotation": float(heading[-1]) + turn}
-        values |= dict(zip(names[3:], totals, strict=True))
+        moved = heading[-1] + turn, max(chord * abs(place[-1]), 1e-300)
+        totals = (float(total) for total in (*moved, *(part.sum() for part in sums)))
+        values = dict(zip(names, totals, strict=True))
         if not values["work"] > 0:
             raise ProblemError(
                 "the path does not move, or too little to do work against friction: it has no "
@@ -341,14 +349,11 @@ def replay(
     known = panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)
     known[np.isin(panels.left, breaks), 0] += ONE_SIDED
     # what the balance leaves over counts in proportion to each
-    forces = [each.needs_forces * abs(values[each.name]) for each in asked]
-    sizes = [1.0, values["distance"], values["work"], *forces]
+    sizes = {each.name: each.needs_forces * abs(values[each.name]) for each in asked}
+    sizes = values | {"rotation": 1.0} | sizes
     return Replay(
         values=values,
-        errors={
-            name: float(lost[name].sum() + residual * size)
-            for name, size in zip(names, sizes, strict=True)
-        },
+        errors={name: float(lost[name].sum() + residual * sizes[name]) for name in names},
         others=dict(zip(names, map(float, others), strict=True)),
         lever=reach,
         actuator_work=float(((panels.joint_power @ WHOLE[-1]) * panels.width).sum()),
@@ -365,8 +370,4 @@ def replay(
 def replayer(regime: Regime) -> Callable[..., Replay]:
     """The replay of a regime, with the arguments of `replay`; a regime of one's own has it as
     ``replay``."""
-    if hasattr(regime, "replay"):
-        return regime.replay
-    if regime.froude:
-        return partial(inertial_replay, regime=regime)
-    return partial(slope_replay, slope=regime) if regime.slides else replay
+    return getattr(regime, "replay", partial(replay, regime=regime))

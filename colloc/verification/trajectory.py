@@ -94,7 +94,6 @@ def plan_trajectory(
 def _within(
     speeds: np.ndarray, pace: np.ndarray, clock: np.ndarray, time: np.ndarray, most: np.ndarray
 ) -> np.ndarray:
-    """Speeds ``(n_joint, n)`` at the pace of the clock, within limits but for rounding."""
     index = np.clip(np.searchsorted(clock, time, side="right") - 1, 0, pace.size - 1)
     return np.clip(speeds / pace[index], -most[:, None], most[:, None])
 
@@ -133,7 +132,6 @@ def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approac
 
 
 def shortest_period(path: Path, limits: np.ndarray, *, keep_pace: bool = False) -> float:
-    """Least seconds of a path with joint speeds ``(n_joint,)`` [rad/s]."""
     return float(_slowest(path(_PHASES)[0], limits, keep_pace).mean())
 
 

@@ -11,6 +11,7 @@ from colloc.gaits.regime import Regime
 from colloc.reduced.program import ReducedProgram
 from colloc.search.iterate import space_near
 from colloc.verification.mesh_error import mesh_error
+from tests.shared.inertia import played as with_inertia
 
 GAIT = colloc.Fourier([0.3, -0.2], cos=[[0.6, 0.1], [0.3, 0.2]], sin=[[0.2, 0.3], [0.7, -0.1]])
 CHAIN = colloc.Chain((0.3, 0.25, 0.45), masses=(0.2, 0.2, 0.6), inertias=(0.002, 0.01, 0.004))
@@ -30,8 +31,8 @@ def problem(**fields):
 def newtons_joint_powers(froude, points=60, n=4000):
     """Power of each joint in a period, from the followed place and orientation of the body by
     Newton's law for each link in the plane: a program that shares no line with the torques."""
-    ran = colloc.inertial_motion(CHAIN, FLOOR, GAIT, DELTA, froude, tolerance=1e-8)
-    spline = CubicSpline(ran.phases, ran.states[3:6].T)
+    ran = with_inertia(CHAIN, FLOOR, GAIT, DELTA, froude, tolerance=1e-8)
+    spline = CubicSpline(ran.tail[0], ran.states[3:6].T)
     t, h, lengths = (np.arange(n) + 0.5) / n, 1e-4, np.array(CHAIN.lengths)
     masses = np.array(CHAIN.masses)
 
@@ -72,7 +73,7 @@ def test_newtons_law_for_every_link_says_the_same():
     """Up to its 60 points on a link."""
     powers, idle = newtons_joint_powers(FROUDE), 1.3 * DELTA
     positive = 0.5 * (powers + np.sqrt(powers**2 + idle**2)).sum(axis=0).mean()
-    played = colloc.inertial_motion(CHAIN, FLOOR, GAIT, DELTA, FROUDE, quantities=["driven_work"])
+    played = with_inertia(CHAIN, FLOOR, GAIT, DELTA, FROUDE, quantities=["driven_work"])
     assert played.values["driven_work"] == pytest.approx(positive, rel=1e-3)
     assert played.values["driven_work"] > 1.1 * played.work, "joints brake links, too"
 
@@ -82,7 +83,7 @@ def test_joints_do_the_work_of_friction_and_climb(grade):
     """What kinetic energy takes it gives back in a period."""
     gait = colloc.Fourier(GAIT.mean, GAIT.cos, GAIT.sin, theta=0.7)
     how = {"regime": Regime(grade=grade), "quantities": [ALL]} if grade else {"quantities": [ALL]}
-    played = colloc.inertial_motion(CHAIN, FLOOR, gait, DELTA, FROUDE, tolerance=1e-7, **how)
+    played = with_inertia(CHAIN, FLOOR, gait, DELTA, FROUDE, tolerance=1e-7, **how)
     assert played.values["all_power"] == pytest.approx(played.work, rel=3e-7)
 
 
@@ -91,9 +92,7 @@ def test_slow_motion_is_the_limit():
     slow = colloc.replay(CHAIN, FLOOR, GAIT, DELTA, tolerance=1e-8, objective=DRIVEN)
     off = []
     for froude in (8e-3, 2e-3):
-        played = colloc.inertial_motion(
-            CHAIN, FLOOR, GAIT, DELTA, froude, tolerance=1e-5, objective=DRIVEN
-        )
+        played = with_inertia(CHAIN, FLOOR, GAIT, DELTA, froude, tolerance=1e-5, objective=DRIVEN)
         off.append(played.values["driven_work"] / slow.values["driven_work"] - 1)
     assert 1e-2 > off[0] > 3 * off[1] > 0
 
@@ -106,9 +105,9 @@ def test_stated_errors_cover_the_true_ones(seed):
     law = colloc.Friction(mu_t=mu_t, mu_f=mu_f, mu_b=mu_b)
     delta, froude = 10 ** rng.uniform([-4, -2.5], [-1.5, 0])
     at = CHAIN, law, colloc.Fourier(mean, *series), delta, froude
-    true = colloc.inertial_motion(*at, tolerance=1e-7, objective=DRIVEN)
+    true = with_inertia(*at, tolerance=1e-7, objective=DRIVEN)
     for tolerance in (1e-3, 1e-5):
-        played = colloc.inertial_motion(*at, tolerance=tolerance, objective=DRIVEN)
+        played = with_inertia(*at, tolerance=tolerance, objective=DRIVEN)
         off = abs(played.values["driven_work"] - true.values["driven_work"])
         assert off <= played.errors["driven_work"]
         assert abs(DRIVEN(played.values) / DRIVEN(true.values) - 1) <= played.error_of(DRIVEN)
@@ -175,7 +174,7 @@ def test_a_pace_is_best_where_time_and_energy_are_worth_the_same():
     assert found.status == "solved", found.message
     assert 0.02 < found.froude < 0.5
     beside = [
-        colloc.inertial_motion(
+        with_inertia(
             colloc.Chain(), colloc.Friction(), found.gait, 1e-2, by * found.froude,
             objective=colloc.Objective(PACED),
         )

@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Fourier, Friction, NotConvergedError, ellipse, replay, solve_balance
-from colloc.dynamics.branches import BACKWARDS, FORWARDS, followed_motion, on_one_branch
+from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import chain_motion
-from colloc.mechanics.solution_branches import Branches, all_balanced_velocities
+from colloc.mechanics.solution_branches import (
+    BACKWARDS,
+    FORWARDS,
+    Branches,
+    all_balanced_velocities,
+    followed_motion,
+    on_one_branch,
+)
 from colloc.verification.adaptive_motion import fine_motion
 from tests.shared.laws import coulomb
 
@@ -103,7 +110,7 @@ def test_the_stated_error_covers_both_directions(law, seeds):
 def test_a_period_that_is_open_at_its_ends_is_followed_around_them():
     """The phase at which a period begins changes neither its work nor its rotation."""
     path, t = random_path(3), np.arange(2000) / 2000
-    several = followed_motion(BODY, STEEP, *path(t), 1e-4).apart.any(axis=0)
+    several = followed_motion(Instants(BODY, STEEP, *path(t), 1e-4))[1].any(axis=0)
     middle = t[np.flatnonzero(several)[several.sum() // 4]]
     paths = path, lambda s: path((s + middle) % 1.0)
     first, shifted = (replay(BODY, STEEP, each, 1e-4, tolerance=1e-4) for each in paths)
@@ -122,7 +129,8 @@ def test_an_instant_without_any_balance_is_said_to_have_none(monkeypatch):
         z[:, :, 3], sign[:, 3] = np.nan, 0.0
         return Branches(z, sign)
 
-    monkeypatch.setattr("colloc.dynamics.branches.all_balanced_velocities", lost)
+    monkeypatch.setattr("colloc.mechanics.solution_branches.all_balanced_velocities", lost)
     angles, rates = ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 20))
+    law = Friction(mu_t=1.0, mu_f=0.01, mu_b=100.0)
     with pytest.raises(NotConvergedError, match="at 1 of 20 instants"):
-        followed_motion(Chain(), Friction(mu_t=1.0, mu_f=0.01, mu_b=100.0), angles, rates, 1e-4)
+        followed_motion(Instants(Chain(), law, angles, rates, 1e-4))

@@ -10,7 +10,7 @@ from colloc.pictures.export import mjcf
 from colloc.reduced.motion import ReducedMotion
 from colloc.results.robot import joint_torques
 from colloc.search.iterate import space_near
-from colloc.verification.differential_motion import inertial_motion
+from tests.shared.inertia import played as with_inertia
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[1.17], [0.12]], sin=[[0.0], [-0.91]], theta=0.7)
 BODY, FRICTION = colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
@@ -30,7 +30,7 @@ def motion_of(stated):
 
 def played(**slope):
     regime = Regime(**slope)
-    return inertial_motion(BODY, FRICTION, LEANING, DELTA, 0.1, tolerance=1e-6, regime=regime)
+    return with_inertia(BODY, FRICTION, LEANING, DELTA, 0.1, tolerance=1e-6, regime=regime)
 
 
 def test_a_collocated_period_is_the_one_that_is_followed_from_instant_to_instant():

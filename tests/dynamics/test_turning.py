@@ -10,7 +10,6 @@ from colloc.reduced.program import ReducedProgram
 from colloc.results.motion import arc
 from colloc.search.iterate import space_near
 from colloc.transcription.full_program import FullProgram
-from colloc.verification.differential_motion import inertial_replay
 from colloc.verification.mesh_error import mesh_error
 from tests.shared.cases import cases
 
@@ -129,8 +128,7 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     per_period = delta_per_period(problem.gait, gait, delta)
     how = {"breaks": gait.corner_phases, "tolerance": 1e-6, "turn": turn}
     how |= {"regime": problem.regime} if problem.froude else {}
-    run = inertial_replay if problem.froude else replay
-    fine = run(BODY, problem.law, gait, per_period, **how)
+    fine = replay(BODY, problem.law, gait, per_period, **how)
     control = control_problem(problem)
     error = mesh_error(control, control.in_phases(full.mesh, gait), gait, per_period, 1e-7)
     off = values["distance"] / values["work"] / fine.efficiency - 1

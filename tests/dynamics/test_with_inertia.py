@@ -15,6 +15,7 @@ from colloc.pictures.movie import pictures
 from colloc.reduced.program import ReducedProgram
 from colloc.search.iterate import space_near
 from colloc.verification.mesh_error import mesh_error
+from tests.shared.inertia import played as with_inertia
 from tests.shared.without_kernel import numpy_instead
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
@@ -77,7 +78,7 @@ def test_shooting_and_collocation_find_the_same_motion(froude):
     """One by steps of its own through time, one for all instants at once."""
     reduced, v = program(problem(froude=froude, intervals=200))
     stated = reduced.space.control.problem
-    shot = colloc.inertial_motion(stated.body, stated.law, reduced.space.member(v), 1e-2, froude)
+    shot = with_inertia(stated.body, stated.law, reduced.space.member(v), 1e-2, froude)
     found = reduced.period(v)
     assert shot.stable
     assert found["distance"] == pytest.approx(shot.distance, rel=2e-4)
@@ -85,7 +86,7 @@ def test_shooting_and_collocation_find_the_same_motion(froude):
     assert found["rotation"] == pytest.approx(shot.rotation, abs=2e-4)
     kind, mesh, gait = reduced.motion.kind, reduced.space.mesh, reduced.space.member(v)
     along = kind.simulate(mesh, Shapes(*gait(mesh.times), 1e-2), np.empty(0))
-    shot_there = [np.interp(mesh.edges, shot.phases, each) for each in shot.states[:3]]
+    shot_there = [np.interp(mesh.edges, shot.tail[0], each) for each in shot.states[:3]]
     np.testing.assert_allclose(along.edges, shot_there, atol=1e-3 * np.abs(shot.states[:3]).max())
 
 
@@ -183,7 +184,7 @@ def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_f
     assert found.status == "solved", found.message
     assert found.answer.program == stated.formulation, "IPOPT confirms it on the full program"
     slow = colloc.solve(stated.with_(froude=0.0), starts=1)
-    played = colloc.inertial_motion(stated.body, stated.law, slow.gait, 1e-2, 0.1)
+    played = with_inertia(stated.body, stated.law, slow.gait, 1e-2, 0.1)
     assert found.efficiency > 1.2 * played.efficiency
     checks = {check.name: check.value for check in found.certificate.checks}
     assert 0 < checks["stability"] < 1
@@ -219,7 +220,7 @@ def test_cycles_from_rest_are_those_after_which_the_motion_goes_as_far(paced):
 
 def test_a_gait_that_is_given_is_evaluated_at_its_pace(paced):
     stated, found = paced.problem, paced
-    played = colloc.inertial_motion(stated.body, stated.law, ROUND, 1e-2, 0.1)
+    played = with_inertia(stated.body, stated.law, ROUND, 1e-2, 0.1)
     assert found.success
     assert found.efficiency == pytest.approx(played.efficiency, rel=1e-4)
     again = colloc.replay(stated.body, stated.law, ROUND, 1e-2, froude=0.1, tolerance=1e-5)

@@ -34,6 +34,7 @@ from colloc import (
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.balance import solve_smooth
 from colloc.verification.trajectory import plan_trajectory
+from tests.shared.inertia import played as with_inertia
 from tests.shared.without_kernel import numpy_instead
 
 KNOWN = Path(__file__).with_name("known.json")
@@ -119,7 +120,7 @@ def objectives_and_small_delta():
 def slope_and_inertia():
     at = Chain(), UNEQUAL, SKEW, 0.1
     steep = colloc.slope_motion(*at, 0.2, heading=1.0, periods=2, tolerance=1e-6)
-    fast = colloc.inertial_motion(*at, 0.2, tolerance=1e-6)
+    fast = with_inertia(*at, 0.2, tolerance=1e-6)
     moved = [*steep.climb, *steep.aside, *steep.joint_work, *steep.friction_work]
     return [*moved, fast.distance, fast.work, fast.rotation]
 

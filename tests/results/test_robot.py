@@ -17,6 +17,7 @@ from colloc.pictures.report_page import report_page
 from colloc.results.motion import Arc, arc
 from colloc.results.robot import RobotSheet, in_si
 from colloc.verification.trajectory import plan_trajectory
+from tests.shared.inertia import played as with_inertia
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
 SLOW = SIZE | {"period": 5000.0}
@@ -111,7 +112,7 @@ def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
     for name in [*names.split(), "peak_power_W"]:
         assert robot.facts[name] == pytest.approx(paced[name], rel=0.01), name
     at = problem.body, problem.friction, three_link.gait, 1e-4, robot.froude
-    played = colloc.inertial_motion(*at, tolerance=1e-4)
+    played = with_inertia(*at, tolerance=1e-4)
     assert robot.facts["body_lengths_per_period"] == pytest.approx(played.distance, rel=1e-3)
     assert played.distance < 0.7 * three_link.distance
     assert f"Without inertia it would move at {three_link.distance / 1.5:.4g} m/s" in str(robot)

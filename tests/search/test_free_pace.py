@@ -12,6 +12,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.search.iterate import space_near
 from colloc.search.optimise import optimise
 from colloc.search.options import FINE
+from tests.shared.inertia import played as with_inertia
 
 ROUND, STANDING_POWER = colloc.ellipse(A0=0, A1=2.2, B1=1.3), "distance / (work + 0.1 * period)"
 
@@ -62,7 +63,7 @@ def test_inertia_alone_decides_the_pace_of_the_efficiency_where_sideways_frictio
     assert found.optimal
     assert 0.03 < froude < 2.5
     at = colloc.Chain(), law, found.gait, 1e-2
-    slower, own, faster = (colloc.inertial_motion(*at, froude * by) for by in (0.7, 1, 1.4))
+    slower, own, faster = (with_inertia(*at, froude * by) for by in (0.7, 1, 1.4))
     assert own.efficiency > max(slower.efficiency, faster.efficiency)
 
 

@@ -12,6 +12,7 @@ from colloc.mechanics.inertia import momentum_rates
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.verification.differential_motion import GaitWithInertia, PeriodicRun
+from tests.shared.inertia import played as with_inertia
 
 GAIT = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
@@ -69,11 +70,11 @@ def newtons_law(body, law, gait, delta, froude, steps=400, periods=3):
 def test_newtons_law_for_dense_points_says_the_same(body, friction, gait):
     """Error of 40 points a link, 1e-4; masses of its own move a body otherwise."""
     distance, work, rotation = newtons_law(body, friction, gait, 0.05, 0.1)
-    played = colloc.inertial_motion(body, friction, gait, 0.05, 0.1)
+    played = with_inertia(body, friction, gait, 0.05, 0.1)
     assert (played.distance, played.work) == pytest.approx((distance, work), rel=1e-3)
     assert played.rotation == pytest.approx(rotation, abs=1e-3)
     if body.masses:
-        plain = colloc.inertial_motion(UNEQUAL, friction, gait, 0.05, 0.1)
+        plain = with_inertia(UNEQUAL, friction, gait, 0.05, 0.1)
         assert abs(played.distance / plain.distance - 1) > 0.05
 
 
@@ -91,7 +92,7 @@ def test_without_friction_momentum_is_conserved():
 def test_errors_that_are_stated_are_no_smaller_where_friction_hardly_brakes(mu):
     """A period leaves nearly all of a change of momenta: a small gap is a motion far off."""
     at = CHAIN, colloc.Friction(mu, mu, mu), LEANING, 1e-3, 1.0
-    rough, fine = (colloc.inertial_motion(*at, tolerance=tolerance) for tolerance in (1e-4, 1e-6))
+    rough, fine = (with_inertia(*at, tolerance=tolerance) for tolerance in (1e-4, 1e-6))
     assert np.abs(rough.multipliers).max() > 0.96
     assert abs(rough.distance - fine.distance) < rough.errors["distance"] < 1e-4 * rough.distance
 
@@ -110,10 +111,10 @@ def test_a_period_that_does_not_close_is_off_by_no_more_than_is_stated():
 
 
 def test_a_motion_is_stable_where_no_small_change_grows():
-    played = colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, 0.1, tolerance=1e-3)
+    played = with_inertia(CHAIN, ISOTROPIC, GAIT, 1e-2, 0.1, tolerance=1e-3)
     assert played.stable
     for grows in (1.1, -1.1, 0.8 + 0.8j):
-        assert not replace(played, multipliers=np.array([0.2, grows, 0.5])).stable
+        assert not replace(played, multipliers=(0.2, grows, 0.5)).stable
 
 
 def test_slow_motion_is_the_limit():
@@ -131,8 +132,8 @@ def test_slow_motion_is_the_limit():
 def test_corners_are_passed_where_they_are():
     """Against steps that know nothing of them but are small."""
     gait = colloc.Corners(np.array([[0.0, 1.5, 0.4], [0.0, 0.2, 1.4]]))
-    exact = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1, breaks=gait.corner_phases)
-    blind = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 0.1)
+    exact = with_inertia(CHAIN, ISOTROPIC, gait, 1e-2, 0.1, breaks=gait.corner_phases)
+    blind = with_inertia(CHAIN, ISOTROPIC, gait, 1e-2, 0.1)
     assert exact.distance == pytest.approx(blind.distance, rel=1e-4)
 
 
@@ -144,7 +145,7 @@ def test_on_a_rougher_floor_slow_enough_is_as_much_faster_and_there_the_part_is_
     ]
     assert froude[1] == pytest.approx(30 * froude[0], rel=1e-6)
     slow = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2)
-    played = colloc.inertial_motion(CHAIN, ISOTROPIC, GAIT, 1e-2, froude[0])
+    played = with_inertia(CHAIN, ISOTROPIC, GAIT, 1e-2, froude[0])
     assert abs(1 - played.efficiency / slow.efficiency) == pytest.approx(loss, rel=0.05)
 
 
@@ -154,7 +155,7 @@ def test_a_gait_whose_efficiency_no_pace_changes_much_is_slow_enough_at_none():
     with pytest.raises(colloc.NotConvergedError, match=said):
         colloc.slow_enough(CHAIN, ISOTROPIC, gait, 1e-2, 0.3)
     slow = colloc.replay(CHAIN, ISOTROPIC, gait, 1e-2)
-    fast = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, 10.0)
+    fast = with_inertia(CHAIN, ISOTROPIC, gait, 1e-2, 10.0)
     assert abs(1 - fast.efficiency / slow.efficiency) < 0.3
 
 
@@ -178,7 +179,7 @@ def test_a_body_from_rest_moves_as_newtons_law_says():
 
 def test_periods_from_rest_become_alike_and_are_joined_without_a_gap():
     at = UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1
-    begun, played = colloc.motion_from_rest(*at, periods=4), colloc.inertial_motion(*at)
+    begun, played = colloc.motion_from_rest(*at, periods=4), with_inertia(*at)
     settled = played.distance, played.work, played.rotation
     assert begun.periods[-1] == pytest.approx(settled, abs=1e-4)
     assert not begun.states[:, 0].any()
@@ -245,5 +246,5 @@ def test_a_gait_that_inertia_makes_better_is_slow_enough_up_to_where_it_is_by_th
     gait = colloc.ellipse(A0=1.5, A1=1.1, B1=0.9)
     froude = colloc.slow_enough(CHAIN, ISOTROPIC, gait, 1e-2, 0.05)
     slow = colloc.replay(CHAIN, ISOTROPIC, gait, 1e-2).efficiency
-    played = colloc.inertial_motion(CHAIN, ISOTROPIC, gait, 1e-2, froude, tolerance=1e-4)
+    played = with_inertia(CHAIN, ISOTROPIC, gait, 1e-2, froude, tolerance=1e-4)
     assert played.efficiency / slow - 1 == pytest.approx(0.05, rel=0.05)

@@ -23,10 +23,15 @@ from colloc.mechanics.contact import crossing_depth
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.search import optimise as refine
-from colloc.verification import refinement
+from colloc.verification import mesh_error as refinement
 from colloc.verification.adaptive_motion import fine_motion, rates_at
-from colloc.verification.mesh_error import constraint_violation, gait_motion, mesh_error
-from colloc.verification.refinement import kink_phases, plan_mesh
+from colloc.verification.mesh_error import (
+    constraint_violation,
+    gait_motion,
+    kink_phases,
+    mesh_error,
+    plan_mesh,
+)
 from tests.shared.stages import answer_near
 
 GAIT = ellipse(0, 2.8, 1.25)

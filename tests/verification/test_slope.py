@@ -19,7 +19,6 @@ from colloc import (
 )
 from colloc.gaits.regime import Regime
 from colloc.system.errors import NotConvergedError, ProblemError
-from colloc.verification.differential_motion import slope_replay
 from tests.shared.laws import coulomb
 
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
@@ -215,7 +214,7 @@ def test_a_replay_on_a_slope_says_for_which_part_of_the_time_its_motion_is_open(
     rng, law = np.random.default_rng(5), Friction(mu_t=100, mu_f=1, mu_b=1)
     waves = rng.uniform(-0.8, 0.8, 2), rng.normal(0, 0.8, (2, 2)), rng.normal(0, 0.8, (2, 2))
     at = Chain(), law, Fourier(*waves, theta=0.3), 1e-2
-    replayed = slope_replay(*at, slope=Regime(grade=0.02), tolerance=1e-3, instants=400)
+    replayed = replay(*at, regime=Regime(grade=0.02), tolerance=1e-3, instants=400)
     open_for = slope_motion(*at, grade=0.02, tolerance=1e-3).several
     assert 1e-3 < open_for < 1e-2
     assert replayed.several == pytest.approx(open_for, rel=0.3)
