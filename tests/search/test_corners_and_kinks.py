@@ -55,7 +55,7 @@ def test_refinement_encloses_a_kink_instead_of_following_it():
 def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
     """Nearest to it, no gradient is below 1e-3; those of both sides cancel. Which meshes lead there
     depends on rounding: of some thirty such starts two did not settle, and one ended on a mesh that
-    smooths the kink. From afar rounding chooses the optimum, too: there is one of 0.4469."""
+    smooths the kink. Rounding may choose the optimum, too, even there: there is one of 0.4469."""
     body, friction = Chain((0.2, 0.5, 0.3)), Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0)
     gait_at_kink = Fourier(
         mean=[0.296, -0.3171],
@@ -67,9 +67,9 @@ def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
     solutions = [solve(problem.with_(guess=gait_at_kink.grown(each)), 1) for each in factors]
     certified = [each for each in solutions if each.status == "solved"]
     assert len(certified) >= 2, [each.message for each in solutions]
-    assert any("kink" in each.message for each in certified)
-    for solution in certified:
-        assert solution.certificate.efficiency == pytest.approx(0.4162, abs=2e-4)
+    ends = [(each.certificate.efficiency, "kink" in each.message) for each in certified]
+    assert any(is_kink and abs(value - 0.4162) < 2e-4 for value, is_kink in ends)
+    assert min(ends)[0] > 0.416
 
 
 def test_a_gait_whose_finer_mesh_has_no_balance_is_kept_and_says_so(monkeypatch):
