@@ -190,10 +190,7 @@ def save_known(rows: Iterable[Known], table: str | os.PathLike[str]) -> None:
 
 def markdown(rows: Iterable[Known]) -> str:
     """The table as people read it."""
-    heads = (
-        "| problem | what is asked | best known | under dry friction | found by "
-        "|\n|---|---|---|---|---|\n"
-    )
+    heads = "| problem | what is asked | best known | under dry friction |\n|---|---|---|---|\n"
 
     def line(row: Known) -> str:
         problem = row.problem
@@ -206,8 +203,8 @@ def markdown(rows: Iterable[Known]) -> str:
         limit = (
             limit
             if row.dry is None or problem.objective != EFFICIENCY
-            else "between {:.6f} and {:.6f}".format(*row.dry)
+            else "{:.6f} to {:.6f}".format(*row.dry)
         )
-        return f"| {problem.name} | {problem.asked} | {told} | {limit} | `{row.command}` |\n"
+        return f"| {problem.name} | {problem.asked} | {told} | {limit} |\n"
 
     return heads + "".join(map(line, rows))

@@ -86,7 +86,7 @@ def starts_summary(
 @cli.command(
     *cli.PROBLEM,
     _STARTS,
-    cli.option(int, "--seed N", "of the sampler (default: 0)", 0, least=0),
+    cli.option(int, "--seed N", "seed of the sampler (default: 0)", 0, least=0),
     cli.WORKERS,
     cli.option(
         str, "--sampler", "perturbed: near the problem's guess", LATIN_HYPERCUBE, choices=SAMPLERS
@@ -94,7 +94,7 @@ def starts_summary(
     _TIME_LIMIT,
     cli.RETRY,
     cli.BOUND,
-    cli.option(int, "--start N", "with an archive: the start to make a result of"),
+    cli.option(int, "--start N", "with an archive: make a result of start N"),
     cli.VERBOSE,
     cli.output("folder, or .h5 file (default: results/NAME.starts.h5; beside an archive)"),
 )
@@ -299,7 +299,7 @@ def _end(options: argparse.Namespace, found: Found) -> int:
         nargs=2,
         metavar=("FIRST", "SECOND"),
     ),
-    cli.option(int, "--points N", "about so many, without duplicates (default: 5)", 5, least=2),
+    cli.option(int, "--points N", "approximate number of gaits (default: 5)", 5, least=2),
     cli.option(int, "--starts N", "starting points for both ends (default: as solve)", least=1),
     cli.output("folder, or .csv file (default: results/NAME.front.csv)"),
     cli.NO_FIGURE,
@@ -314,7 +314,7 @@ def pareto(options: argparse.Namespace) -> int:
 @cli.command(
     *cli.PROBLEM,
     cli.option(float,
-        "--turn DEG", "per period (default: -30 -15 0 15 30)", [-30.0, -15.0, 0.0, 15.0, 30.0],
+        "--turn DEG", "per cycle (default: -30 -15 0 15 30)", [-30.0, -15.0, 0.0, 15.0, 30.0],
         nargs="+"),
     cli.option(float, "--spot DEG", "turns on the spot, with the least work", [], nargs="+"),
     cli.option(int, "--starts N", "starts for the straight gait (default: 32)", least=1),

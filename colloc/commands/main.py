@@ -33,7 +33,10 @@ SUBCOMMANDS = {
     "pareto": ("families", "trade-off (Pareto front) of two objectives, as certified gaits"),
     "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),
     "evaluate": ("solve", "evaluate a gait of your own: joint angles from a CSV file"),
-    "identify": ("solve", "friction of a floor from joint angles and the way that a robot went"),
+    "identify": (
+        "solve",
+        "friction coefficients of a floor, from angles and path of a robot",
+    ),
     "verify": ("results", "check a result again by independent replay; or compare two results"),
     "report": ("results", "one self-contained web page about a result, to read or to send"),
     "animate": ("results", "the motion as GIF or MP4"),
@@ -209,7 +212,7 @@ CHANGES = (
     option(int, "--mesh N", "intervals of the first mesh", dest="intervals"),
     option(float, "--mesh-tolerance TOL", "relative error to refine to; 0: never"),
     option(str, "--scheme NAME", "trapezoid, hermite-simpson, gauss-N or radau-N"),
-    option(str, "--formulation NAME", "of the balance as constraints: full, or implicit velocity"),
+    option(str, "--formulation NAME", "the balance as constraints: full, or implicit velocity"),
 )
 PROBLEM = (
     option(str, "problem", "a Python file that states PROBLEM, for example problems/three_link.py"),
@@ -217,13 +220,17 @@ PROBLEM = (
 )
 """The problem file, and the changes to it that every solving command takes."""
 ROBOT = (
-    option(float, "--length M", "of the stretched robot [m] (default: the problem's)"),
-    option(float, "--mass KG", "of the robot [kg] (default: the problem's)"),
+    option(float, "--length M", "length of the stretched robot [m] (default: the problem's)"),
+    option(float, "--mass KG", "mass of the robot [kg] (default: the problem's)"),
     option(float, "--gravity G", "default: the problem's, or 9.81 m/s^2"),
 )
-PERIOD = option(float, "--period S", "seconds per period")
-MAX_SPEED = option(float, "--max-speed V", "of the joints [rad/s], one or one each", nargs="+")
-MAX_TORQUE = option(float, "--max-torque M", "of the joints [N m], one or one each", nargs="+")
+PERIOD = option(float, "--period S", "seconds per cycle")
+MAX_SPEED = option(
+    float, "--max-speed V", "limit of the joints [rad/s], one or one each", nargs="+"
+)
+MAX_TORQUE = option(
+    float, "--max-torque M", "limit of the joints [N m], one or one each", nargs="+"
+)
 
 
 def problem_changes(options: argparse.Namespace) -> dict[str, Any]:

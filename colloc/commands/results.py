@@ -26,8 +26,8 @@ _TOLERANCE = 1e-6
 _AGREEMENT, _SAME_SIZE = 3.0, 10.0
 _MOST_INSTANTS = 100_000
 _ROBOT = ("length", "mass", "gravity", "period", "max_speed", "max_torque")
-_REPLAY = cli.option(float, "--tolerance TOL", "of the replayed efficiency, relative", _TOLERANCE)
-_DRY = cli.flag("--dry", "also bounds under dry friction, with no delta")
+_REPLAY = cli.option(float, "--tolerance TOL", "relative, of the replayed efficiency", _TOLERANCE)
+_DRY = cli.flag("--dry", "also bound the efficiency under dry friction, without smoothing")
 _ERRORS = {
     **{name: f"{name}_error" for name in ("efficiency", "value", "distance", "work")},
     "efficiency_at_zero_delta": "error_at_zero_delta",
@@ -45,7 +45,7 @@ _ENDINGS = {
 }
 _BESIDE = "beside", {"metavar": "OTHER.h5", "nargs": "?", "help": "another result, shown beside it"}
 _SERVO = tuple(
-    cli.option(kind, f"--{name}", f"of servos: {what}, one or one each", nargs="+")
+    cli.option(kind, f"--{name}", f"servos: {what}; one for all or one each", nargs="+")
     for kind, name, what in (
         (float, "neutral PULSE", "pulse of the straight joint (default: 1500)"),
         (float, "scale PULSES", "pulses per degree (default: 2000 for 180 degrees)"),
@@ -194,7 +194,7 @@ def report(options: argparse.Namespace) -> int:
     if table.exists():
         front = read_front(table, solution.problem)
         if front is None:
-            cli.complain(f"{table} is of another problem, and left out.")
+            cli.complain(f"{table} is about another problem, and left out.")
     with cli.status_line(options) as line:
         line.say("writing the page")
         sections = {"robot": robot, "front": front, "beside": beside}
@@ -216,11 +216,11 @@ def report(options: argparse.Namespace) -> int:
     cli.option(
         str, "--format", "default: by the suffix of --output, else gif", choices=("gif", "mp4")
     ),
-    cli.option(int, "--periods N", "periods in a row (default: 2)", 2),
-    cli.option(float, "--seconds S", "per period (default: that of the robot, or 4)"),
+    cli.option(int, "--periods N", "cycles in a row (default: 2)", 2),
+    cli.option(float, "--seconds S", "seconds per cycle (default: those of the robot, or 4)"),
     cli.option(float, "--fps N", "frames per second (default: 20)", 20.0),
     cli.option(int, "--width PIXELS", "default: 900", 900),
-    cli.flag("--from-rest", "with inertia: the first periods of a body that starts at rest"),
+    cli.flag("--from-rest", "with inertia: the first cycles of a body that starts at rest"),
     cli.flag("--no-arrows", "do not draw friction"),
     cli.output("folder or file (default: beside the result)"),
 )
@@ -247,7 +247,7 @@ def animate(options: argparse.Namespace) -> int:
     cli.PERIOD,
     cli.MAX_SPEED,
     *cli.ROBOT,
-    cli.option(int, "--periods N", "repeat the period N times (default: 1)", 1),
+    cli.option(int, "--periods N", "repeat the cycle N times (default: 1)", 1),
     ("--ramp", {
         "action": argparse.BooleanOptionalAction, "default": True,
         "help": "begin straight, at rest, before time 0 (default)",

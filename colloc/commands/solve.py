@@ -44,21 +44,21 @@ EXIT = {
     INTERRUPTED: CODE_INTERRUPTED,
 }
 _SI: dict[str, tuple[dict[str, float], str, str]] = {
-    "length": ({"m": 1.0, "cm": 0.01, "mm": 0.001}, "M", "of the stretched robot"),
-    "mass": ({"kg": 1.0, "g": 0.001}, "KG", "of the robot"),
+    "length": ({"m": 1.0, "cm": 0.01, "mm": 0.001}, "M", "length of the stretched robot [m]"),
+    "mass": ({"kg": 1.0, "g": 0.001}, "KG", "mass of the robot [kg]"),
     "period": (
         {"s": 1.0, "ms": 0.001},
         "S",
-        "seconds per cycle; or the shortest and the longest, between which it is sought",
+        "seconds per cycle; or the shortest and the longest to search",
     ),
     "max_speed": (
         {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30},
         "V",
-        "of the joints [rad/s]",
+        "speed limit of the joints [rad/s]",
     ),
-    "max_torque": ({}, "M", "of the joints [N m]"),
-    "idle_power": ({}, "P", "that electronics draw [W]"),
-    "backlash": (_ANGLES, "ANGLE", "of a joint [rad]"),
+    "max_torque": ({}, "M", "torque limit of the joints [N m]"),
+    "idle_power": ({}, "P", "power of the electronics [W]"),
+    "backlash": (_ANGLES, "ANGLE", "backlash of the joints [rad]"),
 }
 """What a robot is stated by: units of its option, and what they are."""
 
@@ -303,7 +303,7 @@ def bound_facts(bound: Bound | None) -> dict | None:
     cli.option(
         float,
         "--seconds S",
-        "wall time allowed; then the best gait so far counts",
+        "wall time; then the best gait so far is the answer",
         math.inf,
         least=0,
     ),
@@ -316,8 +316,8 @@ def bound_facts(bound: Bound | None) -> dict | None:
         choices=("reduced", "full"),
     ),
     cli.BOUND,
-    cli.flag("--dry", "certify it also under dry friction, with no delta (a second)"),
-    cli.flag("--front", "also gaits from this one to the farthest: NAME.front.csv, NAME.front/"),
+    cli.flag("--dry", "also certify under dry friction, without smoothing (a second)"),
+    cli.flag("--front", "also the front to the farthest gait: NAME.front.csv, NAME.front/"),
     cli.NO_FIGURE,
     cli.flag("--pdf", "draw NAME.pdf too"),
     cli.VERBOSE,
@@ -430,7 +430,7 @@ def evaluate(options: argparse.Namespace) -> int:
 
 @cli.command(
     *_OF_A_GAIT,
-    cli.option(float, "--length M", "of the robot [m] (default: the problem's)", least=0),
+    cli.option(float, "--length M", "length of the robot [m] (default: the problem's)", least=0),
     cli.option(float, "--mu-forward MU", "the forward coefficient, measured otherwise", least=0),
 )
 def identify(options: argparse.Namespace) -> int:

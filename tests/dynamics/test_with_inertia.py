@@ -227,7 +227,7 @@ def test_a_gait_that_is_given_is_evaluated_at_its_pace(paced):
     assert again.efficiency == pytest.approx(played.efficiency, rel=2e-5)
     told = "\n".join(summary_lines(found, None, verbose=True))
     assert "played at the Froude number 0.1" in told
-    assert f"played slowly   {found.played_slowly:.4f}" in told
+    assert f"quasi-static    {found.played_slowly:.4f}" in told
 
 
 def test_what_a_gait_that_turns_is_worth_slowly_is_the_limit_of_slow_paces():
