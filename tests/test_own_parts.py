@@ -164,7 +164,7 @@ def test_a_limit_of_your_own_is_kept_certified_stored_and_read(tmp_path):
     moments, _ = moments_at(found, np.linspace(0, 1, 4001))
     assert (moments**2).sum(axis=0).max() == pytest.approx(0.005, rel=1e-4)
     checks = {check.name: check for check in found.certificate.checks}
-    assert "nearest to its own: heat" in checks["actuators"].meaning
+    assert "closest: heat" in checks["actuators"].meaning
     read = load(save(found, tmp_path / "warm.h5"))
     assert (read.problem.hash, read.problem.limits) == (problem.hash, problem.limits)
 

@@ -107,7 +107,7 @@ class Regime:
             words.append(f"played at the Froude number {self.froude:.4g}")
             if not self.slides:
                 period = 1 / np.sqrt(GRAVITY * self.froude)
-                words[-1] += f": a body of 1 m takes {period:.3g} s a period"
+                words[-1] += f": {period:.3g} s per cycle for a body of 1 m"
         return "; ".join(words)
 
     @property

@@ -223,7 +223,7 @@ class RobotSheet:
             needed = math.sqrt(self.length / (self.pressing * froude))
             raise ProblemError(
                 f"{problem.name} is the best gait for the Froude number {froude:.4g}: a robot of "
-                f"{self.length:g} m has to take {needed:.4g} s a period, not {self.period:g}: "
+                f"{self.length:g} m needs {needed:.4g} s per cycle, not {self.period:g} s: "
                 f"solve again with froude={self.froude:.4g}."
             )
         paced = problem.froude or not rate_independent(problem.law)

@@ -167,7 +167,7 @@ def _rows(
     angles, rates = path(np.union1d(np.linspace(0.0, 1.0, 20001), breaks))
     balanced = "net force and torque at all replayed instants"
     if problem.froude:
-        balanced = "what a period changes of the momenta"
+        balanced = "change of the momenta over a cycle"
     yield "balance in replay", fine.residual, at.kkt, balanced
     opened, meaning = float(np.abs(ends[:, 1] - ends[:, 0]).max()), "s after one period [rad]"
     yield "closure", opened, at.closure, f"{usual.quantity}{meaning}"
@@ -186,7 +186,7 @@ def _rows(
         motors = rates if joints is None else joints.motor_rates(rates)
         share = np.abs(motors).max(axis=1) / np.array(problem.largest_speeds)
         name = f"{'motor' if joints else usual.coordinate} {int(share.argmax()) + 1}"
-        meaning = f"excess over a limit, relative; nearest to its own: {name}"
+        meaning = f"excess over a limit, relative; closest: {name}"
         yield "joint speed", max(float(share.max()) - 1.0, 0.0), at.replay_gap, meaning
     if problem.robot is not None and problem.robot.backlash:
         share = problem.robot.backlash / max(float(np.ptp(angles, axis=1).max()), 1e-300)
@@ -199,7 +199,7 @@ def _rows(
         yield "statics", lean, 1.0, f"{meaning}reported, not judged"
     if fine.multipliers:
         meaning = "largest Floquet multiplier: "
-        meaning += "what a period leaves of a small change of the momenta"
+        meaning += "share of a small momentum change left after a cycle"
         yield "stability", float(np.abs(fine.multipliers).max()), 1.0, meaning
     if claimed is not None:
         gap = claimed / fine.value - 1
@@ -217,7 +217,7 @@ def _rows(
         yield f"least {aim.name}", missed, at.replay_gap, meaning
     if names := problem.path_limits.names:
         nearest = names[np.argmax(fine.shares)]
-        meaning = f"excess over a limit, relative, in replay; nearest to its own: {nearest}"
+        meaning = f"excess over a limit, relative, in replay; closest: {nearest}"
         yield "actuators", max(float(fine.shares.max()) - 1.0, 0.0), at.replay_gap, meaning
     if problem.regime.towards is not None:
         meaning = "of the way, off the one that was asked for [rad]"

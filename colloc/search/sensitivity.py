@@ -212,7 +212,7 @@ def _lagrangian(space: SearchSpace, v: np.ndarray, delta: float) -> Callable[[Pr
     conditions = stationarity(optimum, v)
     if not conditions.kkt_error <= 1e-4 * abs(optimum.objective(v)):
         why = f"the gradient of the Lagrangian does not vanish ({conditions.kkt_error:.0e})"
-        raise ProblemError(f"the gait has no sensitivity: {why}, as where it rests on a kink.")
+        raise ProblemError(f"the gait has no sensitivity: {why}, as at a kink.")
     named = zip(optimum.row_names, conditions.on_rows, strict=True)
     on_rows = {name: float(multiplier) for name, multiplier in named if multiplier}
 

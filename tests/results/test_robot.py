@@ -236,7 +236,7 @@ def test_motors_that_take_no_power_back_work_by_what_they_drive_with_each_for_it
 
 
 def test_the_sheet_of_a_gait_with_inertia_is_of_its_own_pace_alone(braking):
-    said = f"best gait for the Froude number 1: a robot of 1.2 m has to take {PERIOD:.4g} s"
+    said = f"best gait for the Froude number 1: a robot of 1.2 m needs {PERIOD:.4g} s"
     for factor in (0.95, 1.05):
         with pytest.raises(ProblemError, match=said):
             braking.robot(LENGTH, MASS, factor * PERIOD)
