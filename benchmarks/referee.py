@@ -38,11 +38,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     table = "another table than benchmarks/known.json; with --add (default: known.json) begun as a copy of that"
     for name, settings in (
-        option(str, "--table", "FILE.json", table),
-        option(str, "--only", "NAME", "rows of the problem of this name"),
+        option(str, "--table FILE.json", table),
+        option(str, "--only NAME", "rows of the problem of this name"),
         flag("--dry", "check bounds under dry friction as well"),
-        option(str, "--add", "FILE.h5", "a result to take in"),
-        option(str, "--by", "COMMAND", "with --add: the command that anyone can find it with"),
+        option(str, "--add FILE.h5", "a result to take in"),
+        option(str, "--by COMMAND", "with --add: the command that anyone can find it with"),
         *PRINTING,
     ):
         parser.add_argument(name, **settings)
