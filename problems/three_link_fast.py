@@ -1,7 +1,7 @@
 r"""The best gait for the pace at hand: a robot of one metre that takes two seconds a cycle.
 
 Inertia counts at this pace: the best slow gait, of efficiency 0.26, keeps 0.157. One number decides
-how much, the Froude number, here over the friction of the floor.
+how much, the Froude number: 2 s on a floor of mu = 0.5 are as 1.41 s on one of mu = 1.
 
 $$\mathrm{Fr}\,\ddot{\mathbf x} = \int_0^1 \mathbf f\,ds, \qquad \mathrm{Fr} = \frac{L}{\mu g T^2}$$
 """
