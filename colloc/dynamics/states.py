@@ -97,7 +97,8 @@ class CollocatedStates:
             if not np.isfinite(size):
                 break
             if np.abs(step).max() < _ROUNDED:
-                off = 0.0
+                x, off = x - step, 0.0
+                now, *_ = self._residual(rates, x)
                 break
             if monotone:
                 before = off

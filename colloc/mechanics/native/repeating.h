@@ -259,8 +259,11 @@ static inline bool repeats(Periods *q, double *x)
         const double size = length_apart(all, q->step, q->step, 0.0);
         if (!isfinite(size))
             return false;
-        if (largest_size(all, q->step) < ROUNDED)
-            return true;
+        if (largest_size(all, q->step) < ROUNDED) {
+            for (ptrdiff_t k = 0; k < all; ++k)
+                x[k] -= q->step[k];
+            return isfinite(find_residual(q, x));
+        }
         /* derivatives are good for steps in proportion to how well they told this one */
         const double missed = length_apart(all, q->next, q->step, 1.0) * size;
         double share = missed <= trusted ? 1.0 : fmax(LEAST_SHARE, trusted / missed);
