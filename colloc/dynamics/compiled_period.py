@@ -36,7 +36,7 @@ class CompiledPeriod:
         return cls(kind, mesh) if level and native_kernel(kind.body, kind.law) else None
 
     def covers(self, shapes: Shapes) -> bool:
-        """Whether delta is large enough."""
+        """True if delta is large enough."""
         return bool(shapes.delta >= _DRY * np.abs(shapes.rates).max(initial=1.0))
 
     def simulate(

@@ -247,7 +247,7 @@ class Chain(Body):
 
     @cached_property
     def symmetric(self) -> bool:
-        """Whether lengths, weights, masses and feet are the same from both ends."""
+        """True if lengths, weights, masses and feet are the same from both ends."""
         parts = self.lengths, self.weights, self.masses, self.inertias
         same = all(np.allclose(row, row[::-1], rtol=0, atol=1e-14) for row in parts)
         feet = self.standing_on

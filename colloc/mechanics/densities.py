@@ -165,12 +165,12 @@ class _OfInstants:
 
     @cached_property
     def needs_forces(self) -> bool:
-        """Whether it depends on more than shapes and their rates."""
+        """True if it depends on more than shapes and their rates."""
         return bool({"speed", "moment", "power", "idle"} & self._formula.names)
 
     @cached_property
     def depends_on_delta(self) -> bool:
-        """Whether it depends on delta by itself."""
+        """True if it depends on delta by itself."""
         return "idle" in self._formula.names
 
     def _value(self, now: Instants) -> Array:

@@ -298,7 +298,7 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
 
 
 def same_feet(feet: Sequence[Foot], others: Sequence[Foot]) -> bool:
-    """Whether they are the same in any order, up to rounding."""
+    """True if they are the same in any order, up to rounding."""
     left = list(others)
     for foot in feet:
         match = next((other for other in left if foot.is_like(other)), None)

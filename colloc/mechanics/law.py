@@ -26,16 +26,16 @@ class Law(Protocol):
 
     @property
     def reversible(self) -> bool:
-        """Whether reversing the velocity reverses the force."""
+        """True if reversing the velocity reverses the force."""
 
     @property
     def associated(self) -> bool:
-        """Whether minus the force is the gradient of a convex function: then a balance has exactly
+        """True if minus the force is the gradient of a convex function: then a balance has exactly
         one solution."""
 
     @property
     def regularised(self) -> bool:
-        """Whether it depends on delta, the speed below which it is smoothed."""
+        """True if it depends on delta, the speed below which it is smoothed."""
 
     @property
     def smallest(self) -> float:
@@ -76,5 +76,5 @@ class Law(Protocol):
 
 
 def rate_independent(law: Law) -> bool:
-    """Whether distance and work of a path do not depend on its pace."""
+    """True if distance and work of a path do not depend on its pace."""
     return law.degree == 0

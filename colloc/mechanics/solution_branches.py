@@ -60,7 +60,7 @@ class Branches(NamedTuple):
 
     @property
     def complete(self) -> np.ndarray:
-        """Whether the signs add up to 1, as they do over all solutions."""
+        """True if the signs add up to 1, as they do over all solutions."""
         return self.sign.sum(axis=0) == 1
 
 

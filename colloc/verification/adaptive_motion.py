@@ -282,7 +282,7 @@ class Replay(Period):
 
     @property
     def stable(self) -> bool:
-        """Whether motions beside this one come closer to it, period by period."""
+        """True if motions beside this one come closer to it, period by period."""
         return max(map(abs, self.multipliers), default=0.0) < 1.0
 
     @property

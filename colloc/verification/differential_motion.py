@@ -185,7 +185,7 @@ class SlopeMotion:
 
     @property
     def stable(self) -> bool:
-        """Whether headings beside this one come closer to it."""
+        """True if headings beside this one come closer to it."""
         return bool(np.prod(self.steering) < 1.0)
 
 
