@@ -176,7 +176,7 @@ def pictures(
     tall = float(np.clip(span[1] / span[0], 0.4, 0.9)) * share * width
     height = 2 * round((tall + 0.13 * width) / 2)
     scale = max(span[0] / (share * width), span[1] / tall)  # lengths of a pixel
-    strength = min(each.arrow_scale for each in shown)
+    strength, small = min(each.arrow_scale for each in shown), min(1.0, width / 640)
     with figure_style():
         figure = Figure(figsize=(width / 100, height / 100), dpi=100)
         figure.set_layout_engine("none")
@@ -194,16 +194,20 @@ def pictures(
             if alone:
                 if real:
                     value = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s   (squares of 10 cm)"
-                figure.text(left, 0.93, title + value, fontsize=11, weight="bold")
+                figure.text(left, 0.93, title + value, fontsize=11 * small, weight="bold")
                 continue
             way = f"{each.distance:.4f} body lengths a period"
             if real:
                 way = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s, {times[k]:.3g} s a period"
-            figure.text(left, 0.085 * width / height, title, fontsize=11, weight="bold", va="top")
-            figure.text(left, 0.055 * width / height, f"{way}; {value}", fontsize=9, va="top")
+            figure.text(
+                left, 0.085 * width / height, title, fontsize=11 * small, weight="bold", va="top"
+            )
+            figure.text(
+                left, 0.055 * width / height, f"{way}; {value}", fontsize=9 * small, va="top"
+            )
         right, unit = (share if alone else 0.99), " s" if real else ""
         top = 0.93 if alone else 1 - 0.028 * width / height
-        clock = figure.text(right, top, "", fontsize=10, color=GREY, ha="right")
+        clock = figure.text(right, top, "", fontsize=10 * small, color=GREY, ha="right")
         if planar:
             plane = figure.add_axes((0.77, 0.2, 0.22, 0.62))
             draw_shape_path(plane, solution)
