@@ -200,7 +200,7 @@ def test_solve_leaves_a_front_that_the_report_shows(tmp_path, monkeypatch, capsy
     (tmp_path / "floor.py").write_text(ONE_FLOOR.replace("mu_t=10", "mu_t=9"), encoding="utf-8")
     assert main(["solve", "floor.py", "--starts", "1", "--no-figure"]) == 0
     assert main(["report", "results/floor.h5"]) == 0
-    assert "of another problem, and left out" in capsys.readouterr().err
+    assert "another problem, and left out" in capsys.readouterr().err
 
 
 ONE_FLOOR = """
