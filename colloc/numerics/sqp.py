@@ -13,6 +13,7 @@ nearest to 0 find them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol, TypeVar
 
@@ -183,7 +184,8 @@ def nonnegative(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     if n > _FEW:
         from scipy.optimize import nnls
 
-        return nnls(matrix, right, maxiter=30 * n)[0]
+        with suppress(RuntimeError):  # SciPy before 1.15 may go round in circles
+            return nnls(matrix, right, maxiter=30 * n)[0]
     x, free = np.zeros(n), np.zeros(n, dtype=bool)
     size = np.abs(matrix).sum(axis=0).max(initial=0.0)
     tolerance = 10 * max(matrix.shape) * np.finfo(float).eps * size
