@@ -343,3 +343,17 @@ def test_linear_programs_on_two_threads_are_what_they_are_one_after_another():
 def test_a_linear_program_without_a_solution_says_so(column, why):
     with pytest.raises(NotConvergedError, match=why):
         linear_maximum(np.ones(2), np.array([[1.0, column]]), np.array([-column]))
+
+
+def test_nonnegative_least_squares_are_met_where_those_of_scipy_go_round_in_circles(monkeypatch):
+    rng = np.random.default_rng(0)
+    matrix, right = rng.standard_normal((9, 14)), rng.standard_normal(9)
+    expected = nonnegative(matrix, right)
+
+    def circles(*_, **__):
+        raise RuntimeError("Maximum number of iterations reached.")
+
+    monkeypatch.setattr("scipy.optimize.nnls", circles)
+    found = nonnegative(matrix, right)
+    assert found.min() >= 0
+    np.testing.assert_allclose(matrix @ found, matrix @ expected, atol=1e-12)
