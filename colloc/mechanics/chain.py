@@ -309,8 +309,8 @@ class Chain(Body):
         """`imbalance` at the worst shape, whatever the limits of the joints."""
         path, contact = self.weighted_path(None), self.contact
         weight, links = contact.weight[:, 0], contact.links
-        arms = (weight @ path[links] - self.mass_column()[:, 0] @ path).astype(complex)
-        np.add.at(arms, links, weight * (contact.along + 1j * contact.offset)[:, 0])
+        arms = weight @ path[links] - self.mass_column()[:, 0] @ path
+        np.add.at(arms, links, weight * contact.along[:, 0])  # what is offset has a mirror image
         return float(np.abs(arms).sum())
 
     def seen_from_head(

@@ -86,6 +86,15 @@ def test_limits_that_no_gait_could_reach_are_named_with_what_it_could_need():
     ]
 
 
+def test_a_limit_of_speed_that_binds_is_said_to_let_joints_swing_by_half_of_their_way():
+    """To and fro, of 2.5 rad to either side."""
+    fastest = np.abs(LOOP.rates(np.linspace(0, 1, 4001))).max()
+    _, lines = told_of_limits(joint_limit=2.5, speed_limit=fastest)
+    swing = f"swing by {np.degrees(fastest / 2):.3g} of {np.degrees(5.0):.3g} degrees at most"
+    said = f"speed_limit {fastest:g} rad per period, its unit, lets a joint {swing}"
+    assert lines[1:] == [said]
+
+
 def test_limits_of_a_robot_are_told_in_its_units():
     """A third of 3 kg and 1.2 m, as above, and 4 pi in 600 s."""
     robot = Robot(length=1.2, mass=3, period=600, max_speed=1, max_torque=50)

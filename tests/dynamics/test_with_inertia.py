@@ -86,6 +86,10 @@ def test_shooting_and_collocation_find_the_same_motion(froude):
     assert found["rotation"] == pytest.approx(shot.rotation, abs=2e-4)
     kind, mesh, gait = reduced.motion.kind, reduced.space.mesh, reduced.space.member(v)
     along = kind.simulate(mesh, Shapes(*gait(mesh.times), 1e-2), np.empty(0))
+    at = stated.body, stated.law, *gait(mesh.times), along.states
+    gained = kind.equations(mesh).integrals(momentum_rates(*at, delta=1e-2, froude=froude).rates)[0]
+    # Newton's last step leaves rounding alone
+    np.testing.assert_allclose(along.states, along.edges[:, :1] + gained, rtol=0, atol=1e-13)
     shot_there = [np.interp(mesh.edges, shot.tail[0], each) for each in shot.states[:3]]
     np.testing.assert_allclose(along.edges, shot_there, atol=1e-3 * np.abs(shot.states[:3]).max())
 

@@ -9,6 +9,7 @@ from PIL import Image
 
 import colloc
 from colloc import Chain, Free, Harmonic, Problem, ProblemError, Robot
+from colloc.mechanics.densities import Instants
 from colloc.results.comparison import compare
 from colloc.results.robot import in_si
 from colloc.studies.families import ParetoFront
@@ -28,7 +29,7 @@ def test_the_numbers_of_a_problem_follow_from_the_robot():
     assert problem.objective(period) == pytest.approx(0.2 * 0.62 / energy * weight)
 
 
-def test_on_a_slope_that_part_of_gravity_counts_which_presses():
+def test_on_a_slope_that_part_of_gravity_counts_which_presses(unsolved):
     level, slope = (Problem("on", robot=SNAKE, grade=grade) for grade in (0.0, 0.75))
     assert slope.froude == pytest.approx(level.froude * 1.25)
     np.testing.assert_allclose(slope.torque_limit, 1.25 * np.array(level.torque_limit))
@@ -37,6 +38,15 @@ def test_on_a_slope_that_part_of_gravity_counts_which_presses():
     (speed,), (uphill,) = level.path_limits.each, slope.path_limits.each
     assert speed.most == pytest.approx((5 * (0.62 / 9.81) ** 0.5,) * 2)
     assert uphill.most == pytest.approx(np.multiply(speed.most, 1.25**0.5))
+    gait = colloc.Fourier([0.0, 0.0], [[1.2], [0.0]], [[0.0], [0.8]], theta=0.3, log_period=2.0)
+    found = unsolved(slope.with_(guess=gait, gait=Harmonic(1), delta=1e-2))
+    period = np.exp(2.0) * (0.62 / (0.8 * 9.81)) ** 0.5
+    assert found.robot().period == pytest.approx(period)
+    rates = gait.rates(np.zeros(1))
+    now = Instants(
+        slope.body, slope.law, gait.angles(np.zeros(1)), rates, 1e-2, froude=found.froude
+    )
+    np.testing.assert_allclose(uphill.at(now), rates / period / 5)
 
 
 def test_robots_that_are_one_without_dimensions_are_one_problem():

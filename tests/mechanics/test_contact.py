@@ -1,6 +1,7 @@
 """Admissible shapes of lines and strips: smooth bounds against segments and points."""
 
 from dataclasses import replace
+from itertools import product
 
 import casadi as ca
 import numpy as np
@@ -160,6 +161,23 @@ def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_an
     smallest = height[np.abs(steps) == 0.02].item()
     assert passing_depth(Chain(), angles) == pytest.approx(smallest, rel=1e-12)
     assert passing_depth(Chain(), angles[:, :3]) == 0.0
+
+
+def test_links_pass_each_other_where_any_end_changes_its_side_beside_another_link():
+    """Of a body that moves by steps between random shapes."""
+    body, rng, depths = Chain((0.2, 0.1, 0.3, 0.15, 0.25)), np.random.default_rng(9), []
+    for shape in rng.uniform(-2.5, 2.5, (400, 4, 1)):
+        angles = shape + 0.2 * rng.normal(size=(4, 2))
+        at, depth = np.array([1, 1j]) @ np.stack(body.joints(angles)).swapaxes(0, 1), 0.0
+        for k, end in product(range(5), range(6)):
+            if end not in (k, k + 1):
+                seen = (at[end] - at[k]) / (at[k + 1] - at[k])
+                beside = (seen.real > 0) & (seen.real < 1)
+                if beside.all() and np.prod(seen.imag) < 0:
+                    depth = max(depth, body.lengths[k] * np.abs(seen.imag).min())
+        depths.append(depth)
+        assert passing_depth(body, angles) == pytest.approx(depth, abs=1e-12)
+    assert np.count_nonzero(depths) > 20
 
 
 @pytest.mark.parametrize("width", [0.0, 0.02])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from shared.instants import random_instants
 
-from colloc import Chain, Fourier, Friction, Harmonic, PowerLaw, Problem, Viscous, replay
-from colloc.mechanics.balance import joint_moments
+from colloc import Chain, Foot, Fourier, Friction, Harmonic, PowerLaw, Problem, Viscous, replay
+from colloc.mechanics.balance import joint_moments, largest_moments
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 from colloc.transcription.full_program import ACTUATORS
 from tests.shared.stages import program_of
@@ -34,6 +34,15 @@ def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
     slope = (driven(h) - driven(-h)) / (2 * h)
     power = Instants(BODY, law, angles, rates, delta, moments=moments).power.sum(axis=0)
     np.testing.assert_allclose(slope, 0.5 * power, rtol=1e-6)
+
+
+def test_a_joint_holds_no_more_than_friction_and_a_slope_pull_on_its_lighter_side():
+    """Both across a straight body: at the middles of its links, or at its feet."""
+    bound = largest_moments(Chain(masses=(0.2, 0.3, 0.5)), Friction(mu_t=2.0), 0.3)
+    assert bound == pytest.approx([(2.0 / 3 + 0.3 * mass) / 6 for mass in (0.2, 0.5)])
+    aside = [Foot(0, 0.8, offset=side * 0.2) for side in (1, -1)]
+    bound = largest_moments(Chain((0.5, 0.5), feet=[*aside, Foot(1, 0.9)]), Friction(), 0.3)
+    assert bound == pytest.approx([0.5 * (0.1 + 0.2) + 0.3 * 0.5 * 0.25])
 
 
 def test_torques_are_limited_both_ways_and_powers_one_way():

@@ -105,6 +105,15 @@ def test_every_contact_has_the_coefficients_of_its_own_foot_along_and_across(
     assert [law["mu_t"] for law in stated["laws"]] == [9, 3, 1]
 
 
+def test_a_wheel_on_an_axle_resists_with_its_rolling_friction_at_its_radius(unsolved):
+    gait, how = colloc.ellipse(0.0, 0.8, 0.6), {"gait": Harmonic(1), "delta": 0.1, "intervals": 8}
+    solution = unsolved(Problem("axles", gait, Chain(feet=AXLES), **how))
+    root = ElementTree.fromstring(mjcf(solution.robot(**SIZE)))
+    losses = [float(x.get("frictionloss")) for x in root.iter("joint") if x.get("frictionloss")]
+    radii = [numbers(x.get("size"))[0] for x in root.iter("geom") if x.get("type") == "ellipsoid"]
+    assert losses == pytest.approx(0.05 * 9.81 * np.array(radii), rel=1e-5)  # a kilogram on each
+
+
 def played(path, gait, period, periods=2):
     """Places of the centre of mass and of the tail [m] through the last of some periods of a file
     in MuJoCo, as it is written: servos get the gait's angles."""
