@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 import xarray
 
+from colloc import save
 from colloc.commands.main import SUBCOMMANDS, main
 from colloc.commands.solve import summary_lines
-from colloc.results.store import save
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS, CURATED = ROOT / "docs", ROOT / "results/curated"

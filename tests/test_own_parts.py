@@ -8,20 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colloc import (
-    Chain,
-    Harmonic,
-    Objective,
-    PathLimit,
-    Polygon,
-    Problem,
-    ProblemError,
-    Quantity,
-    ellipse,
-    load,
-    save,
-    solve,
-)
+import colloc
+from colloc import Harmonic, Objective, PathLimit, Problem, Quantity, ellipse, load, save, solve
 from colloc.gaits import gait_fields
 from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.bodies import Body
@@ -49,14 +37,14 @@ def test_a_body_of_your_own_is_solved_certified_kept_and_read(monkeypatch, tmp_p
     assert isinstance(body, Body)
     read = load(save(found, tmp_path / "tapered.h5"))
     assert (read.problem.body, read.problem.hash) == (body, found.problem.hash)
-    same = Chain(body.lengths)
+    same = colloc.Chain(body.lengths)
     np.testing.assert_allclose(body.lengths[1:], 0.8 * np.array(body.lengths[:-1]))
     again = solve(found.problem.with_(body=same), 1)
     assert again.value == pytest.approx(found.value, rel=1e-9)
 
 
 def test_a_body_that_says_its_outline_alone_has_its_centre_of_mass():
-    body, angles = Chain((0.2, 0.5, 0.3)), np.random.default_rng(3).normal(size=(2, 6))
+    body, angles = colloc.Chain((0.2, 0.5, 0.3)), np.random.default_rng(3).normal(size=(2, 6))
     np.testing.assert_allclose(Body.centre(body, angles), body.centre(angles), atol=1e-14)
 
 
@@ -68,7 +56,9 @@ class Tents:
 
 def test_what_is_no_class_of_gaits_is_told_what_it_lacks(monkeypatch):
     monkeypatch.setattr(gait_fields, "CLASSES", [*gait_fields.CLASSES, Tents])
-    with pytest.raises(ProblemError, match=r"a Tents does not say its .*functions.*gaits\.linear"):
+    with pytest.raises(
+        colloc.ProblemError, match=r"a Tents does not say its .*functions.*gaits\.linear"
+    ):
         Problem("tents", gait=Tents(), delta=1e-2)
 
 
@@ -117,12 +107,14 @@ def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
     read = load(save(found, tmp_path / "cool.h5"))
     assert (read.problem.hash, read.certificate.values) == (problem.hash, values)
     assert read.problem.objective == cool
-    with pytest.raises(ProblemError, match="the heat of a path depends on how fast it is followed"):
-        problem.with_(gait=Polygon(4, "bilateral"))
+    with pytest.raises(
+        colloc.ProblemError, match="the heat of a path depends on how fast it is followed"
+    ):
+        problem.with_(gait=colloc.Polygon(4, "bilateral"))
 
 
 @pytest.mark.parametrize(
-    "gait", [Harmonic(1, "bilateral"), Polygon(3, "bilateral")], ids=["series", "path"]
+    "gait", [Harmonic(1, "bilateral"), colloc.Polygon(3, "bilateral")], ids=["series", "path"]
 )
 def test_a_quantity_stated_anew_is_the_one_that_is_known(gait):
     mine = Objective("distance / mine", quantities=[Quantity("mine", DRIVEN_WORK.density)])

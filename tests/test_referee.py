@@ -12,8 +12,8 @@ import pytest
 import colloc
 from benchmarks.known import known, markdown, row_of, save_known, with_row
 from benchmarks.referee import main
+from colloc import ProblemError, StoreError
 from colloc.commands.main import main as colloc_main
-from colloc.system.errors import ProblemError, StoreError
 
 ROWS = known()
 PAGE = Path(__file__).parents[1] / "docs" / "known.md"

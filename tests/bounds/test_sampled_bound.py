@@ -9,17 +9,8 @@ import pytest
 from scipy import sparse
 from scipy.optimize import linprog
 
-from colloc import (
-    Chain,
-    Elliptic,
-    Foot,
-    Friction,
-    Harmonic,
-    ModalBody,
-    Problem,
-    Viscous,
-    solve_balance,
-)
+import colloc
+from colloc import Chain, Foot, Friction, Harmonic, ModalBody, Problem, ProblemError, solve_balance
 from colloc.bounds.motions import (
     CoulombMotion,
     Domain,
@@ -30,7 +21,6 @@ from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline, largest_gain
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, smallest_maximum
 from colloc.mechanics.balance import instant, total_power
-from colloc.system.errors import ProblemError, StoreError
 from research.small_gaits import balanced_motion, small_gait
 from tests.shared.laws import coulomb
 
@@ -316,12 +306,12 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     keys = {
         bound_key(Domain(b, f, a), tiny)
         for b in (Chain(), Chain((0.3, 0.4, 0.3)))
-        for f in (Friction(), Friction(mu_t=2.0), Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0))
+        for f in (Friction(), Friction(mu_t=2.0), colloc.Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0))
         for a in (2.0, 2.5)
     }
     assert len(keys) == 12
     cache.write_text("{")
-    with pytest.raises(StoreError, match="cannot be read"):
+    with pytest.raises(colloc.StoreError, match="cannot be read"):
         efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
 
 
@@ -401,7 +391,7 @@ def test_climbs_go_along_creases_where_one_joint_rests():
 
 @pytest.mark.parametrize(
     "changes",
-    [{"friction": Viscous(normal=2.0, tangential=1.0)}, {"body": ModalBody(2)}],
+    [{"friction": colloc.Viscous(normal=2.0, tangential=1.0)}, {"body": ModalBody(2)}],
     ids=["drag", "smooth"],
 )
 def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_path):

@@ -9,8 +9,8 @@ import pandas
 import pytest
 
 import colloc
+from colloc import save
 from colloc.commands.results import export
-from colloc.results.store import save
 
 
 @pytest.fixture

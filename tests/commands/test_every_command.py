@@ -7,12 +7,9 @@ import sys
 
 import pytest
 
-from colloc import Chain, Wheel
+from colloc import save
 from colloc.commands.main import SUBCOMMANDS
 from colloc.commands.main import main as colloc
-from colloc.commands.solve import init
-from colloc.gaits.problem_file import read_problem_file
-from colloc.results.store import save
 from colloc.search.options import Tolerances
 
 PROBLEM = "from colloc import *\nPROBLEM = Problem('quick', gait=Harmonic(1, 'bilateral'))\n"
@@ -231,33 +228,3 @@ def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
         assert hint in capsys.readouterr().err
     assert colloc(["--version"]) == 0
     assert "casadi" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("links", [3, 4, 7])
-def test_the_file_states_a_problem_of_so_many_links(links, tmp_path, capsys):
-    path = tmp_path / "mine.py"
-    assert init([str(path), "--links", str(links)]) == 0
-    problem = read_problem_file(path).problem
-    assert problem.name == "mine"
-    assert problem.body.lengths == pytest.approx([1 / links] * links)
-    assert f"colloc solve {path}" in capsys.readouterr().out
-
-
-def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):
-    bodies = []
-    for name, lengths in (("cm", ("22", "30", "30", "22")), ("m", ("0.22", "0.3", "0.3", "0.22"))):
-        path = tmp_path / f"{name}.py"
-        assert init([str(path), "--links", *lengths, "--wheels"]) == 0
-        bodies.append(read_problem_file(path).problem.body)
-    assert bodies[0].lengths == pytest.approx([22 / 104, 30 / 104, 30 / 104, 22 / 104])
-    assert bodies[1].lengths == pytest.approx(bodies[0].lengths)
-    assert bodies[0] == Chain(
-        bodies[0].lengths, feet=tuple(Wheel(link, rolling=0.05, axle=True) for link in range(4))
-    )
-
-
-def test_a_body_that_differs_from_both_ends_is_given_gaits_that_it_can_have(tmp_path):
-    for lengths, symmetry in ((("1", "2", "1"), "bilateral"), (("1", "2", "3"), "none")):
-        path = tmp_path / f"{symmetry}.py"
-        assert init([str(path), "--links", *lengths]) == 0
-        assert read_problem_file(path).problem.gait.symmetry == symmetry

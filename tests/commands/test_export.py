@@ -10,17 +10,11 @@ import pandas
 import pytest
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
+import colloc
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, ProblemError, Viscous, ellipse, save
 from colloc.commands.results import export as main
 from colloc.commands.solve import summary_lines
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.problem import Problem
-from colloc.laws.resistance import Viscous
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
 from colloc.pictures.report_page import report_page
-from colloc.results.store import save
-from colloc.smooth.modal_body import ModalBody
-from colloc.system.errors import ProblemError
 from colloc.verification.differential_motion import GaitWithInertia
 from colloc.verification.replay import replay
 from colloc.verification.trajectory import plan_trajectory, shortest_period
@@ -216,7 +210,10 @@ def test_where_the_pace_matters_it_is_kept_so_that_the_numbers_of_the_result_hol
 
 
 def test_modes_of_a_smooth_body_are_called_modes(unsolved, tmp_path):
-    guess, body = Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]]), ModalBody(2, panels=4)
+    guess, body = (
+        Fourier(np.zeros(2), [[0.6], [0.0]], [[0.0], [0.5]]),
+        colloc.ModalBody(2, panels=4),
+    )
     gait = Harmonic(1, "antipodal")
     solution = unsolved(Problem("soft", guess, body, Friction(mu_t=3), gait, intervals=6))
     assert repr(solution.gait) == "<Fourier of 2 modes>"

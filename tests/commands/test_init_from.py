@@ -1,9 +1,11 @@
-"""A robot's own file, URDF or MJCF, as a problem: links, masses, limits and signs as computed by hand,
-what colloc exports read back, and what is no planar chain refused by name."""
+"""The problem file that `colloc init` writes: of links and a robot in SI units, whatever units are
+typed; and of a robot's own file, URDF or MJCF, with links, masses, limits and signs as computed by
+hand, what colloc exports read back, and what is no planar chain refused by name."""
 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -291,3 +293,63 @@ def test_a_limit_stated_on_the_command_line_is_the_limit(tmp_path):
     assert read(tmp_path, WORM, "--joint-limit", "85deg").joint_limit == pytest.approx(
         math.radians(85), abs=1e-5
     )
+
+
+def stated(path, words=""):
+    assert main([str(path), *words.split()]) == OK
+    return read_problem_file(path).problem
+
+
+@pytest.mark.parametrize("links", [3, 4, 7])
+def test_the_file_states_a_problem_of_so_many_links(links, tmp_path, capsys):
+    problem = stated(path := tmp_path / "mine.py", f"--links {links}")
+    assert problem.name == "mine"
+    assert problem.body.lengths == pytest.approx([1 / links] * links)
+    assert f"colloc solve {path}" in capsys.readouterr().out
+    # without a battery a gait is asked for that one sees
+    assert problem.least_distance == 0.1
+
+
+def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):
+    lengths = "22 30 30 22", "0.22 0.3 0.3 0.22"
+    cm, m = (stated(tmp_path / f"{k}.py", f"--links {lengths[k]} --wheels").body for k in (0, 1))
+    assert cm.lengths == pytest.approx([22 / 104, 30 / 104, 30 / 104, 22 / 104])
+    assert m.lengths == pytest.approx(cm.lengths)
+    wheels = tuple(Wheel(link, rolling=0.05, axle=True) for link in range(4))
+    assert cm == Chain(cm.lengths, feet=wheels)
+
+
+def test_a_body_that_differs_from_both_ends_is_given_gaits_that_it_can_have(tmp_path):
+    for links, symmetry in (("1 2 1", "bilateral"), ("1 2 3", "none")):
+        assert stated(tmp_path / f"{symmetry}.py", f"--links {links}").gait.symmetry == symmetry
+
+
+def test_a_robot_in_si_units_is_stated_whatever_units_are_typed(tmp_path):
+    words = "--links 22 30 30 22 --mu 0.3 --joint-limit 85deg --max-speed 60rpm --max-torque 1.2"
+    words += " --idle-power 2 --backlash 1deg --length {} --mass {} --period {}"
+    sizes = {"m": ("0.62", "0.9", "60"), "cm": ("62cm", "900g", "60000ms")}
+    problems = [stated(tmp_path / f"{unit}.py", words.format(*sizes[unit])) for unit in sizes]
+    for problem in problems:
+        assert problem.joint_limit == pytest.approx(math.radians(85), abs=1e-5)
+        assert problem.friction.mu_b == 0.3
+        assert problem.least_distance is None  # electronics that run make it go far
+    robot = problems[0].robot
+    assert robot == problems[1].robot
+    assert robot.max_speed == pytest.approx(2 * math.pi)
+    assert robot.backlash == pytest.approx(math.radians(1))
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("--length 62 --mass 1 --period 2", "write length=0.62"),
+        ("--length 0.62", "--mass and --period are missing"),
+        ("--links 3.5", "whole number of links"),
+        ("--joint-limit 85grad", "must be a number"),
+    ],
+)
+def test_what_looks_mistyped_is_asked_about(words, says, tmp_path, capsys):
+    with suppress(SystemExit):
+        assert main([str(tmp_path / "mine.py"), *words.split()]) == BAD_PROBLEM
+    assert says in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -8,7 +8,7 @@ import sys
 import casadi
 import pytest
 
-from colloc.results.store import load, save
+from colloc import load, save
 
 QUICK = """# Länge der Schlange: µ_t = 1
 from colloc import *

@@ -7,18 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from colloc import (
-    Chain,
-    Fourier,
-    Friction,
-    Harmonic,
-    PathLimit,
-    Problem,
-    Robot,
-    ellipse,
-    evaluate,
-    replay,
-)
+import colloc
+from colloc import Chain, Fourier, Harmonic, PathLimit, Problem, Robot, ellipse, evaluate, replay
 from colloc.commands.solve import summary_dict, summary_lines
 from colloc.results import limit_use
 from colloc.results.checks import Check
@@ -140,7 +130,7 @@ def test_a_limit_that_a_gait_reaches_is_never_said_not_to_matter(harmonics):
         most = np.abs(gait.rates(np.arange(500) / 500)).max()
         stated = Problem("reached", gait=Harmonic(harmonics), delta=1e-2)
         ones = PathLimit("torque", "moment", 1), PathLimit("power", "power", 1)
-        shares = replay(Chain(), Friction(), gait, 1e-2, tolerance=1e-3, limits=ones).shares
+        shares = replay(Chain(), colloc.Friction(), gait, 1e-2, tolerance=1e-3, limits=ones).shares
         torque, power = (0.99 * part.max() for part in np.split(shares, 2))
         limits = {"torque_limit": torque, "power_limit": power, "speed_limit": 0.99 * most}
         limits |= {"joint_limit": 1.2, "guess": None}

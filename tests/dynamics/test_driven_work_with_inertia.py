@@ -6,11 +6,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import colloc
-from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.regime import Regime
 from colloc.reduced.program import ReducedProgram
 from colloc.search.iterate import space_near
-from colloc.verification.mesh_error import mesh_error
 from tests.shared.inertia import played as with_inertia
 
 GAIT = colloc.Fourier([0.3, -0.2], cos=[[0.6, 0.1], [0.3, 0.2]], sin=[[0.2, 0.3], [0.7, -0.1]])
@@ -18,7 +16,6 @@ CHAIN = colloc.Chain((0.3, 0.25, 0.45), masses=(0.2, 0.2, 0.6), inertias=(0.002,
 FLOOR, DELTA, FROUDE = colloc.Friction(mu_t=1.3, mu_f=0.7, mu_b=1.1), 0.05, 0.3
 DRIVEN = colloc.Objective("driven efficiency")
 ALL = colloc.Quantity("all_power", "sum(power)")
-HEAT = colloc.Quantity("heat", "sum(moment**2)")
 PACED = "distance / (driven_work + 0.05 * period)"
 
 
@@ -89,7 +86,7 @@ def test_joints_do_the_work_of_friction_and_climb(grade):
 
 def test_slow_motion_is_the_limit():
     """The difference falls like the Froude number."""
-    slow = colloc.replay(CHAIN, FLOOR, GAIT, DELTA, tolerance=1e-8, objective=DRIVEN)
+    slow = colloc.replay(CHAIN, FLOOR, GAIT, DELTA, objective=DRIVEN)
     off = []
     for froude in (8e-3, 2e-3):
         played = with_inertia(CHAIN, FLOOR, GAIT, DELTA, froude, tolerance=1e-5, objective=DRIVEN)
@@ -97,7 +94,7 @@ def test_slow_motion_is_the_limit():
     assert 1e-2 > off[0] > 3 * off[1] > 0
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 2, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 3))])
 def test_stated_errors_cover_the_true_ones(seed):
     rng = np.random.default_rng(seed)
     mean, series = 0.4 * rng.normal(size=2), rng.normal(size=(2, 2, 2)) * [0.9, 0.3]
@@ -114,27 +111,6 @@ def test_stated_errors_cover_the_true_ones(seed):
         assert played.error_of(DRIVEN) <= tolerance
 
 
-CASES = [
-    {},
-    {"froude": colloc.Free(0.05, 0.5), "objective": PACED},
-    {"grade": 0.1, "rotation": 0.0, "gait": colloc.BSpline(8)},
-    {"objective": colloc.Objective("distance / (work + 5 * heat)", quantities=[HEAT])},
-]
-
-
-@pytest.mark.parametrize("fields", CASES, ids=["level", "free pace", "slope", "heat"])
-def test_gradients_are_those_of_differences(fields):
-    space, v = space_near(problem(intervals=20, **fields), GAIT)
-    reduced, slope = ReducedProgram(space, DELTA), ReducedProgram(space, DELTA).gradient(v)
-
-    def differences(h):
-        ahead, behind = ([reduced.objective(v + e) for e in s * np.eye(v.size)] for s in (h, -h))
-        return (np.array(ahead) - behind) / (2 * h)
-
-    known = (4 * differences(1e-4) - differences(2e-4)) / 3  # of fourth order
-    np.testing.assert_allclose(slope, known, atol=2e-6 * np.abs(slope).max())
-
-
 def test_shooting_and_collocation_find_the_same_work():
     stated = problem(intervals=200)
     space, v = space_near(stated, GAIT)
@@ -144,14 +120,7 @@ def test_shooting_and_collocation_find_the_same_work():
     assert replayed.actuator_work == pytest.approx(replayed.work, rel=1e-6)
 
 
-def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do():
-    stated = problem(intervals=16, delta=0.1, objective="distance / driven_work")
-    space, v = space_near(stated, GAIT)
-    error = mesh_error(control_problem(stated), space.mesh, space.member(v), 0.1, 1e-7)
-    assert error.value.sum() == pytest.approx(error.total, rel=0.05)
-    assert error.estimate > abs(error.total) > 1e-4
-
-
+@pytest.mark.slow
 def test_a_gait_of_least_driven_work_is_certified_and_beats_that_of_least_work():
     stated = {"body": colloc.Chain(), "friction": colloc.Friction(), "guess": None}
     stated |= {"gait": colloc.Harmonic(1, "antipodal"), "rotation": 0.0, "delta": 1e-2}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import scipy.integrate
 
+from colloc import NotConvergedError
 from colloc.dynamics.follow import integrate_period
-from colloc.system.errors import NotConvergedError
 
 TURN = np.array([[0.0, 2.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 BEGIN = np.array([1.0, 0.0, 2.0])

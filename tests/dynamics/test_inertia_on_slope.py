@@ -40,18 +40,6 @@ def test_a_collocated_period_is_the_one_that_is_followed_from_instant_to_instant
         assert collocated[name] == pytest.approx(followed.values[name], abs=2e-5)
 
 
-@pytest.mark.parametrize(
-    "pace", [{}, {"froude": (0.01, 0.4), "objective": "distance / (work + 0.1 * period)"}]
-)
-def test_gradients_are_those_of_differences(pace):
-    motion, v = motion_of(problem(towards=0.4, **pace))
-    gradients, step = motion.gradients(v, DELTA), 1e-5 * np.linspace(-1.0, 1.0, v.size)
-    after, before = (motion.values(v + sign * step, DELTA) for sign in (1, -1))
-    for name in gradients:
-        difference = 0.5 * (after[name] - before[name])
-        assert gradients[name] @ step == pytest.approx(difference, rel=1e-6, abs=1e-12)
-
-
 def test_slower_and_slower_it_is_the_slow_motion_on_a_slope_to_first_order():
     slow, off = motion_of(problem(froude=0.0)), []
     for froude in (4e-4, 2e-4):

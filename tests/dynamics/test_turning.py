@@ -134,15 +134,3 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     off = values["distance"] / values["work"] / fine.efficiency - 1
     assert off == pytest.approx(error.total, abs=3e-6)
     assert abs(error.total) < error.estimate + 1e-7
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_gradients_of_the_chord_are_those_of_differences(case):
-    problem, h = stated(case, 0.3, 8), 1e-6
-    space, v = space_near(problem, GAIT)
-    motion = ReducedProgram(space, DELTA).motion
-    found = motion.gradients(v, DELTA)
-    for name in ("distance", "rotation"):
-        steps = h * np.eye(v.size)
-        high, low = ([motion.values(v + s * e, DELTA)[name] for e in steps] for s in (1, -1))
-        np.testing.assert_allclose(found[name], np.subtract(high, low) / (2 * h), atol=2e-6)

@@ -109,26 +109,6 @@ def test_half_of_an_antipodal_gait_says_what_all_of_it_does():
     [
         {},
         {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "rotation": 0.0},
-        {"body": STANDING},
-        {"objective": "turning"},
-    ],
-    ids=["whole", "half", "feet", "turning"],
-)
-def test_gradients_are_those_of_differences(fields):
-    reduced, v = program(problem(intervals=30, **fields))
-    step = 1e-5
-    units = step * np.eye(v.size)
-    high, low = ([reduced.objective(v + side * unit) for unit in units] for side in (1, -1))
-    differences = np.subtract(high, low) / (2 * step)
-    atol = 2e-6 * np.abs(differences).max()
-    np.testing.assert_allclose(reduced.gradient(v), differences, atol=atol)
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {},
-        {"gait": colloc.Harmonic(1, "antipodal"), "guess": ROUND, "rotation": 0.0},
         {"froude": colloc.Free(0.05, 0.2), "objective": "distance"},
     ],
     ids=["whole", "half", "free pace"],
@@ -260,13 +240,15 @@ def test_without_inertia_no_body_begins_at_rest(three_link):
         three_link.from_rest(np.zeros(1))
 
 
-def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do():
+@pytest.mark.parametrize("objective", ["efficiency", "distance / driven_work"])
+def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do(objective):
     """Each has an error of its own, though the body turns, and what comes later with it."""
-    stated = problem(intervals=12, delta=0.1, objective="efficiency")
+    stated = problem(intervals=12, delta=0.1, objective=objective)
     space, v = space_near(stated, LEANING)
     error = mesh_error(control_problem(stated), space.mesh, space.member(v), 0.1, 1e-7)
     assert error.value.sum() == pytest.approx(error.total, rel=0.05)
-    assert np.abs(error.value).sum() > 10 * abs(error.total) > 1e-3, "of either sign"
+    assert error.estimate > abs(error.total) > 1e-4
+    assert np.abs(error.value).sum() > 2 * abs(error.total), "of either sign"
 
 
 def test_two_equal_links_go_nowhere_by_an_antipodal_gait():

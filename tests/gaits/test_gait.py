@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Friction, Harmonic, Problem, Serpenoid
-from colloc.gaits.harmonic import ellipse, harmonics_within, shift_phase
-from colloc.results.store import load, save
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, Serpenoid, ellipse, load, save
+from colloc.gaits.harmonic import harmonics_within, shift_phase
 from colloc.search.iterate import space_near
 from colloc.search.solve import solve
 

@@ -128,10 +128,6 @@ def test_delta_keeps_its_meaning_from_class_to_class():
     assert back.delta == pytest.approx(1e-3)
 
 
-def problem(gait, **changes):
-    return Problem("p", **({"guess": ellipse(0, 1.5, 1.0), "gait": gait} | changes))
-
-
 def test_a_pair_of_closed_joints_that_travels_along_a_folded_chain_wastes_nothing_in_the_limit():
     """All joints are open by e but two neighbours, which are folded: W = e/5, d = W (1 - e^2/24).
     No gait exceeds 1."""

@@ -18,7 +18,7 @@ from tests.shared.laws import coulomb
 from tests.shared.stages import program_of
 
 STENCIL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))
-THREE, FOUR = Chain(), Chain((0.2, 0.35, 0.3, 0.15))
+THREE = Chain()
 STICK = [name for name in HARD if name.startswith(("stick", "symmetric"))]
 FOLDS = ["both folded the same way", "both folded opposite ways", "nearly folded"]
 FOLDS.insert(2, "tail folded back, opening only")
@@ -67,8 +67,8 @@ def functions(body, friction, formulation):
     return next(each for each in repeated if each.function.local.shape[0] >= 7)
 
 
-def check_point(body, friction, angles, rates, delta, formulation, *, rng=None, step, tolerance):
-    """At all links of a point in balance, or at the point; `rng` moves forces off the law."""
+def check_point(body, friction, angles, rates, delta, formulation, *, step, tolerance):
+    """At all links of a point in balance, or at the point."""
     angles, rates = np.atleast_1d(angles)[:, None], np.atleast_1d(rates)[:, None]
     n, repeated = body.n_joint, functions(body, friction, formulation)
     function = repeated.function
@@ -89,8 +89,6 @@ def check_point(body, friction, angles, rates, delta, formulation, *, rng=None, 
         c, s = np.cos(phi), np.sin(phi)
         forces = [part[link, 0] for part in now.force]
         x = np.array([phi, w, vs * c - vn * s, vs * s + vn * c, *forces])
-        if rng is not None:
-            x = x + 0.01 * rng.normal(size=x.size)
         given = repeated.values[:, repeated.gather.shape[1] // body.n_link * link]
         check(function, x, given, delta, step, None, tolerance)
 
@@ -112,17 +110,3 @@ def test_point_function_where_nothing_moves(formulation):
     friction, delta = Friction(mu_t=3, mu_f=1, mu_b=1), 1e-2
     at = THREE, friction, (0.7, -0.4), (0.0, 0.0), delta, formulation
     check_point(*at, step=1e-2 * delta, tolerance=1e-5)
-
-
-@pytest.mark.parametrize(
-    "angles",
-    [(np.pi, np.pi / 2), (2 * np.pi / 3, 2 * np.pi / 3), (np.pi, 0.0), (0.0, 0.0)],
-    ids=str,
-)
-def test_contact_at_its_corners(angles):
-    """The smoothed minimum bends within 1e-3 rad of the corner; its derivatives hold there too."""
-    q = ca.SX.sym("q", 2)
-    bounds = ca.vertcat(*(each.excess(q) for each in THREE.contacts()))
-    value, slope = ca.Function("c", [q], [bounds]), ca.Function("d", [q], [ca.jacobian(bounds, q)])
-    found = derivative(lambda at: np.array(value(at)).ravel(), np.array(angles), 1e-5)
-    np.testing.assert_allclose(found, np.array(slope(np.array(angles))), atol=1e-8)

@@ -5,17 +5,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from colloc import (
-    Axle,
-    Chain,
-    Elliptic,
-    Friction,
-    ModalBody,
-    OwnLaw,
-    PowerLaw,
-    Viscous,
-    solve_balance,
-)
+import colloc
+from colloc import Axle, Chain, Elliptic, Friction, ModalBody, OwnLaw, PowerLaw, Viscous
 from colloc.gaits.gait_fields import LAWS, fields, part_from
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.fixed_point import motion_and_derivatives
@@ -210,7 +201,7 @@ def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_l
     found = []
     for law in (Friction(mu, mu, mu), Elliptic(mu, mu, mu)):
         at = Chain(), law, *instants(9, 40), 1e-6
-        solved = solve_balance(*at).require()
+        solved = colloc.solve_balance(*at).require()
         motion, slopes = motion_and_derivatives(*at, solved)
         found.append((motion.z, motion.power, slopes))
     for one, other in zip(*found, strict=True):

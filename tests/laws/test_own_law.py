@@ -6,21 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from colloc import (
-    Chain,
-    Friction,
-    Harmonic,
-    OwnLaw,
-    PowerLaw,
-    Problem,
-    ProblemError,
-    Viscous,
-    ellipse,
-    load,
-    replay,
-    save,
-    solve,
-)
+import colloc
+from colloc import Chain, Friction, OwnLaw, Problem, Viscous, ellipse, load, replay, save, solve
 from colloc.gaits import gait_fields
 from colloc.mechanics.fixed_point import motion_and_derivatives
 
@@ -41,7 +28,10 @@ def test_traits_are_found_from_samples():
     [
         (COULOMB, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5)),
         (OwnLaw("-vs", "-2*vn"), Viscous(normal=2.0, tangential=1.0)),
-        (OwnLaw("-vs/sqrt(speed)", "-2*vn*speed**(-0.5)"), PowerLaw(0.5, mu_t=2.0, mu_f=1.0)),
+        (
+            OwnLaw("-vs/sqrt(speed)", "-2*vn*speed**(-0.5)"),
+            colloc.PowerLaw(0.5, mu_t=2.0, mu_f=1.0),
+        ),
     ],
     ids=["Coulomb", "viscous", "power"],
 )
@@ -93,14 +83,16 @@ class Short:
 
 def test_what_a_law_does_not_say_is_named(monkeypatch):
     monkeypatch.setattr(gait_fields, "LAWS", [*gait_fields.LAWS, Short])
-    with pytest.raises(ProblemError, match="a Short does not say its reversible, associated"):
+    with pytest.raises(
+        colloc.ProblemError, match="a Short does not say its reversible, associated"
+    ):
         Problem("short", friction=Short())
 
 
 @pytest.mark.slow
 def test_it_is_solved_certified_kept_and_read(monkeypatch, tmp_path):
     monkeypatch.setattr(gait_fields, "LAWS", [*gait_fields.LAWS, Greased])
-    asked = {"friction": Greased(), "gait": Harmonic(1, "bilateral"), "delta": 1e-2}
+    asked = {"friction": Greased(), "gait": colloc.Harmonic(1, "bilateral"), "delta": 1e-2}
     problem = Problem("greased", ellipse(0, 2.8, 1.3), **asked)
     found = solve(problem, starts=1)
     assert found.status == "solved", found.message

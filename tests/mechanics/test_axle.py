@@ -3,21 +3,8 @@
 import numpy as np
 import pytest
 
-from colloc import (
-    Axle,
-    Chain,
-    Foot,
-    Fourier,
-    Friction,
-    Harmonic,
-    OwnLaw,
-    Problem,
-    ProblemError,
-    Wheel,
-    evaluate,
-    solve,
-    solve_balance,
-)
+import colloc
+from colloc import Axle, Chain, Foot, Fourier, Friction, OwnLaw, Problem, ProblemError, Wheel, solve
 from tests.mechanics.test_floor_contact import wheels_that_do_not_slip
 
 DELTA = 1e-4
@@ -54,7 +41,7 @@ def test_wheels_that_roll_freely_or_hold_firmly_do_not_slip(wheel):
     angles = np.array([[0.9, -0.4, 0.3], [0.2, -1.1, 1.4]])
     rates = np.array([[1.0, -0.5, 0.8], [-0.6, 1.2, 0.4]])
     body = on_axles(**wheel)
-    z = solve_balance(body, Friction(), angles, rates, 1e-3).require().z
+    z = colloc.solve_balance(body, Friction(), angles, rates, 1e-3).require().z
     known = [wheels_that_do_not_slip(body, *at) for at in zip(angles.T, rates.T, strict=True)]
     np.testing.assert_allclose(z, np.transpose(known), atol=1e-8)
 
@@ -108,7 +95,7 @@ def replayed(gait, rolling, n=1000):
 
 def test_it_is_solved_and_certified_and_another_replay_says_the_same():
     problem = Problem(
-        "axles", body=on_axles(rolling=0.3), gait=Harmonic(1, "bilateral"), delta=DELTA
+        "axles", body=on_axles(rolling=0.3), gait=colloc.Harmonic(1, "bilateral"), delta=DELTA
     )
     found = solve(problem, starts=2)
     assert found.status == "solved", found.message
@@ -117,5 +104,5 @@ def test_it_is_solved_and_certified_and_another_replay_says_the_same():
     assert found.efficiency == pytest.approx(distance / work, rel=1e-3)
     assert found.dry().efficiency == pytest.approx([found.efficiency] * 2, rel=1.5e-3)
     # its mirror image goes as far
-    image = evaluate(problem, Fourier.from_table(-found.gait.table))
+    image = colloc.evaluate(problem, Fourier.from_table(-found.gait.table))
     assert image.distance == pytest.approx(found.distance)

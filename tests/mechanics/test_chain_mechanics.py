@@ -6,19 +6,8 @@ import pytest
 from shared.instants import random_instants, random_loads
 from shared.points import wrench
 
-from colloc import (
-    Axle,
-    Chain,
-    Elliptic,
-    Foot,
-    Friction,
-    OwnLaw,
-    Pad,
-    PowerLaw,
-    Viscous,
-    Wheel,
-    solve_balance,
-)
+import colloc
+from colloc import Axle, Chain, Elliptic, Foot, Friction, OwnLaw, Pad, Viscous, Wheel, solve_balance
 from colloc.mechanics.balance import balance_jacobian, instant, joint_moments, largest_moments
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import chain_motion, motion_and_derivatives
@@ -53,7 +42,7 @@ BODIES = {
     ),
 }  # fmt: skip
 DRY = [Friction(), Friction(mu_t=1.7, mu_f=1, mu_b=1.3), ELLIPTIC]
-LAWS = [*DRY, Viscous(), PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed"), AXLE]
+LAWS = [*DRY, Viscous(), colloc.PowerLaw(0.5), OwnLaw("-vs/speed", "-2*vn/speed"), AXLE]
 each_body = pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 each_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.label)
 each_dry_law = pytest.mark.parametrize("law", [*DRY, AXLE], ids=lambda law: law.label)

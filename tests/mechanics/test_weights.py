@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 from shared.instants import random_instants
 
-from colloc import (
-    Chain,
-    Friction,
-    Harmonic,
-    Problem,
-    ProblemError,
-    ellipse,
-    evaluate,
-    solve_balance,
-)
+import colloc
+from colloc import Chain, Friction, Harmonic, Problem, ellipse, evaluate, solve_balance
 from colloc.bounds.motions import Domain
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.mechanics.inertia import kinetic_energy
@@ -71,7 +63,7 @@ def test_a_bound_knows_the_weights_or_refuses():
     plain, other = (efficiency_bound(body, Friction(), budget=budget) for body in (Chain(), heavy))
     assert abs(plain.sampled - other.sampled) > 1e-3
     numbers = np.array(other.coefficients)
-    with pytest.raises(ProblemError, match="weights"):
+    with pytest.raises(colloc.ProblemError, match="weights"):
         certify(Domain(heavy, Friction(), np.pi), potential_space(other, heavy), numbers, 0.6)
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from colloc import ProblemError
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import curvature_of_moving, peaks
 from colloc.numerics.schemes import scheme
-from colloc.system.errors import ProblemError
 
 ORDERS = {"trapezoid": 2, "hermite-simpson": 4}
 ORDERS |= {f"gauss-{s}": 2 * s for s in range(1, 7)} | {

@@ -8,9 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from colloc import NotConvergedError
 from colloc.numerics.conic import linear_maximum, quadratic_step
 from colloc.numerics.sqp import minimize, nonnegative, stationarity, stationarity_around
-from colloc.system.errors import NotConvergedError
 
 
 class Program:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc.system.errors import ProblemError
+from colloc import ProblemError
 from scripts import reproduce_paper
 from scripts.paper import figures, rows
 from scripts.paper.study import Context, PaperStudy, Part, source_closure

@@ -8,11 +8,11 @@ import pytest
 from PIL import Image
 
 import colloc
+from colloc import save
 from colloc.commands.results import animate as main
 from colloc.pictures.figure import save_panels
 from colloc.pictures.movie import frames, pictures, write_movie
 from colloc.results.motion import lab_outline
-from colloc.results.store import save
 
 
 def dark(picture):

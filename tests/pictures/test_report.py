@@ -11,17 +11,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from colloc.gaits.harmonic import Fourier, Harmonic, ellipse
-from colloc.gaits.objective import Objective
-from colloc.gaits.problem import Problem
-from colloc.gaits.problem_file import Reference, load_problem
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
+import colloc
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, Reference, Solution, ellipse
 from colloc.pictures.movie import frames
 from colloc.pictures.report_page import report_page
 from colloc.results.checks import Check
 from colloc.results.motion import lab_outline
-from colloc.results.solution import Solution
 from colloc.search.certify import certify
 from colloc.search.evaluate import evaluate
 from colloc.verification.replay import replay
@@ -129,7 +124,9 @@ def test_everything_from_the_file_is_escaped(three_link):
     answer = replace(three_link.answer, history=history)
     versions = {EVIL: EVIL, "colloc": EVIL}
     certificate = replace(three_link.certificate, checks=checks)
-    problem = three_link.problem.with_(objective=Objective("distance / work", name=f"\\eta {EVIL}"))
+    problem = three_link.problem.with_(
+        objective=colloc.Objective("distance / work", name=f"\\eta {EVIL}")
+    )
     evil = Solution(problem, answer, certificate, 1.0, EVIL, EVIL, versions)
     page = report_page(evil, Reference(0.2, 0.1, EVIL), EVIL)
     seen = outline(page)
@@ -297,7 +294,7 @@ def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three
     text = unescape(report_page(solution))
     stated = text[text.index("from colloc import Problem") :].partition("</code>")[0]
     (tmp_path / "stated.py").write_text(stated, encoding="utf-8")
-    assert load_problem(tmp_path / "stated.py").hash == three_link.problem.hash
+    assert colloc.load_problem(tmp_path / "stated.py").hash == three_link.problem.hash
     assert "save the problem source above" in text
 
 

@@ -7,8 +7,8 @@ import sys
 import matplotlib
 import pytest
 
+from colloc import save
 from colloc.pictures.style import save as save_figure
-from colloc.results.store import save
 
 COMMANDS = ("report one.h5", "animate one.h5 --periods 1 --seconds 0.2 --width 200")
 

@@ -14,23 +14,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import (
-    Chain,
-    Concertina,
-    CrawlerBody,
-    Elliptic,
-    Foot,
-    Fourier,
-    Friction,
-    ModalBody,
-    Pad,
-    PowerLaw,
-    Problem,
-    Viscous,
-    Wave,
-    Wheel,
-    ellipse,
-)
+from colloc import Chain, Concertina, Foot, Fourier, Friction, ModalBody, Pad, Problem, Wave, Wheel
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.balance import solve_smooth
 from colloc.verification.trajectory import plan_trajectory
@@ -57,12 +41,12 @@ BALANCES = {
     "weights": (ODD, UNEQUAL, 1e-3),
     "five links": (FIVE, Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0), 1e-3),
     "feet": (FEET, UNEQUAL, 1e-3),
-    "elliptic": (Chain(), Elliptic(mu_t=1.7, mu_f=1.0, mu_b=1.3), 1e-2),
-    "power law": (ODD, PowerLaw(0.5, mu_t=2.0, mu_f=1.0), 1e-2),
-    "viscous": (FIVE, Viscous(normal=1.7, tangential=1.0), 1e-2),
+    "elliptic": (Chain(), colloc.Elliptic(mu_t=1.7, mu_f=1.0, mu_b=1.3), 1e-2),
+    "power law": (ODD, colloc.PowerLaw(0.5, mu_t=2.0, mu_f=1.0), 1e-2),
+    "viscous": (FIVE, colloc.Viscous(normal=1.7, tangential=1.0), 1e-2),
 }
 REPLAYS = {
-    "ellipse": (Chain(), EQUAL, ellipse(0.0, 2.8, 1.25), 1e-3),
+    "ellipse": (Chain(), EQUAL, colloc.ellipse(0.0, 2.8, 1.25), 1e-3),
     "weights": (ODD, UNEQUAL, SKEW, 1e-3),
     "four links": (Chain((0.2, 0.3, 0.3, 0.2)), UNEQUAL, FOUR, 1e-3),
     "several motions": (Chain(), STEEP, OPEN, 1e-4),
@@ -131,7 +115,7 @@ def smooth(name):
 
 
 def crawler():
-    body = CrawlerBody(epsilon=0.12, share=0.4, modes=3, panels=6, order=5)
+    body = colloc.CrawlerBody(epsilon=0.12, share=0.4, modes=3, panels=6, order=5)
     corners = colloc.Corners(body.concertina(amplitude=1.1, sides=9))
     return replayed(body, UNEQUAL, corners, 1e-2, breaks=corners.corner_phases)
 

@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 from shared.address_sanitizer import stays_within_its_arrays
 
+from colloc import Chain, Elliptic, Friction, ProblemError
 from colloc.bounds.motions import CoulombMotion, Domain
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
-from colloc.laws.resistance import Elliptic
 from colloc.mechanics.balance import instant, net_force
-from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
-from colloc.mechanics.friction import Friction
 from colloc.mechanics.native_kernel import native_kernel
-from colloc.system.errors import ProblemError
 from research.guarantee import enclosure, guaranteed
 from research.guarantee.enclosure import (
     CORNERS,

@@ -8,9 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from colloc.laws.resistance import Elliptic
-from colloc.mechanics.chain import Chain
-from colloc.mechanics.friction import Friction
+from colloc import Chain, Elliptic, Friction
 from colloc.mechanics.native_kernel import native_kernel
 from research.guarantee import kernel
 from research.guarantee.c_compiler import compiled_library

@@ -6,18 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc import (
-    Chain,
-    Fourier,
-    Friction,
-    Harmonic,
-    Problem,
-    Solution,
-    ellipse,
-    replay,
-    save,
-    slope_motion,
-)
+import colloc
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, Solution, ellipse, replay, save
 from colloc.commands.results import verify as recheck
 from colloc.gaits.objective import QUANTITIES
 from colloc.results.answer import SecondOrder
@@ -169,7 +159,7 @@ def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(
 def test_a_way_on_a_slope_may_lead_off_by_a_thousandth_of_a_radian(part, passes):
     """Where the gait goes is known from another integration; it is asked to go beside that."""
     gait = replace(ellipse(0, 2.8, 1.3), theta=0.7)
-    ran = slope_motion(Chain(), Friction(), gait, 1e-2, 0.1, tolerance=1e-3)
+    ran = colloc.slope_motion(Chain(), Friction(), gait, 1e-2, 0.1, tolerance=1e-3)
     goes = np.arctan2(ran.aside[0], ran.climb[0])
     asked = {"delta": 1e-2, "grade": 0.1, "towards": goes + part * 1e-3}
     found = gait_certificate(

@@ -5,19 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from colloc import (
-    Chain,
-    Fourier,
-    Friction,
-    Harmonic,
-    Pad,
-    Problem,
-    Solution,
-    ellipse,
-    evaluate,
-    load,
-    save,
-)
+import colloc
+from colloc import Chain, Fourier, Harmonic, Pad, Problem, Solution, ellipse, evaluate, load, save
 from colloc.commands.solve import summary_lines
 from colloc.results.motion import arc, lab_feet, part_speeds
 
@@ -69,7 +58,7 @@ def test_a_gait_that_is_named_from_the_other_end_travels_the_other_end_first():
     ("mu_f", "mu_b", "first"), [(1.0, 5.0, "head first"), (5.0, 1.0, "tail first")]
 )
 def test_a_body_travels_to_the_side_to_which_it_slides_easily(mu_f, mu_b, first):
-    body, friction = Chain((0.5, 0.5)), Friction(mu_t=1.0, mu_f=mu_f, mu_b=mu_b)
+    body, friction = Chain((0.5, 0.5)), colloc.Friction(mu_t=1.0, mu_f=mu_f, mu_b=mu_b)
     stated = Problem("eased", None, body, friction, Harmonic(1), delta=1e-2)
     solution = evaluate(stated, Fourier([0.0], [[1.0]], [[0.0]]))
     assert solution.travels == first

@@ -6,13 +6,13 @@ import h5py
 import numpy as np
 import pytest
 
-from colloc import Friction, Harmonic, Problem, load, save, solve
+from colloc import Friction, Harmonic, Problem, StoreError, load, save, solve
 from colloc.gaits.starts import latin_hypercube_gait, on_speed_floor
 from colloc.results.kept import save_result
 from colloc.search import checkpoint as run_module
 from colloc.search.checkpoint import ROWS, Run
 from colloc.search.options import OPTIONS, TOLERANCES, SearchOptions, Tolerances
-from colloc.system.errors import ReadOnlyRunWarning, StoreError
+from colloc.system.errors import ReadOnlyRunWarning
 from colloc.system.row_file import read_rows
 
 QUICK = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-5)

@@ -7,20 +7,10 @@ import numpy as np
 import pytest
 from shared.instants import random_instants
 
-from colloc import (
-    Chain,
-    Fourier,
-    Friction,
-    Harmonic,
-    PowerLaw,
-    Problem,
-    Viscous,
-    ellipse,
-    evaluate,
-    replay,
-)
+import colloc
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, Viscous, ellipse, evaluate, replay
 from colloc.dynamics.chain import joint_torques, torque_function
-from colloc.mechanics.balance import instant, joint_moments
+from colloc.mechanics.balance import instant, joint_moments, largest_moments
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.inertia import inertial_moments, kinetic_energy, momentum_rates, tail_velocity
@@ -28,6 +18,8 @@ from colloc.results.limit_use import lines
 from colloc.results.robot import joint_torques as sheet_torques
 from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
+from colloc.transcription.full_program import ACTUATORS
+from tests.shared.stages import program_of
 
 ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
@@ -40,26 +32,23 @@ def moments(body, law, angles, rates, delta):
 
 
 def test_a_joint_balances_the_friction_on_all_that_lies_ahead_of_it():
+    """By a plain sum over many points of every link, in the body's axes."""
     angles, rates = random_instants(6)
     found, z = moments(BODY, LAW, angles, rates, 1e-2)
+    now = instant(BODY, LAW, angles, rates, z, 1e-2)
+    along = np.array(BODY.lengths)[:, None] * ((np.arange(20000) + 0.5) / 20000 - 0.5)
     for k in range(6):
-        # a plain sum over many pieces of every link, in the body's axes
-        now = instant(BODY, LAW, angles[:, [k]], rates[:, [k]], z[:, [k]], 1e-2)
-        joints = np.stack(BODY.joints(angles[:, [k]]))[:, :, 0]
+        vs, vn, w = (part[:, [k]] for part in now.velocity)
+        vn = vn + w * along
+        speed, turn = np.sqrt(vs**2 + vn**2 + 1e-4), now.posture.cos + 1j * now.posture.sin
+        force = -(np.where(vs > 0, LAW.mu_f, LAW.mu_b) * vs + 1j * LAW.mu_t * vn) / speed
+        force = force * np.array(BODY.weights)[:, None] / 20000
+        middle = (now.posture.x + 1j * now.posture.y)[:, [k]] / turn[:, [k]] + along
+        hinges = np.array([1, 1j]) @ np.stack(BODY.joints(angles[:, [k]]))[:, :, 0]
         for joint in (0, 1):
-            total = 0.0
-            for link in range(joint + 1, 3):
-                length, weight = BODY.lengths[link], BODY.weights[link]
-                along = length * ((np.arange(20000) + 0.5) / 20000 - 0.5)
-                vs, vn = (float(now.velocity[i][link, 0]) for i in (0, 1))
-                vn = vn + float(now.velocity.w[link, 0]) * along
-                speed = np.sqrt(vs**2 + vn**2 + 1e-4)
-                fs, fn = -(LAW.mu_f if vs > 0 else LAW.mu_b) * vs / speed, -LAW.mu_t * vn / speed
-                c, s = float(now.posture.cos[link, 0]), float(now.posture.sin[link, 0])
-                x = float(now.posture.x[link, 0]) + along * c - joints[0, joint + 1]
-                y = float(now.posture.y[link, 0]) + along * s - joints[1, joint + 1]
-                total += weight * np.mean(x * (fs * s + fn * c) - y * (fs * c - fn * s))
-            assert found[joint, k] == pytest.approx(-total, abs=1e-7)
+            arm = middle - hinges[joint + 1] / turn[:, [k]]
+            torque = (arm.conj() * force)[joint + 1 :].imag.sum()
+            assert found[joint, k] == pytest.approx(-torque, abs=1e-7)
 
 
 def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it():
@@ -76,7 +65,7 @@ def test_torques_of_dry_friction_do_not_know_the_pace_and_powers_double_with_it(
 
 @pytest.mark.parametrize(
     ("law", "degree"),
-    [(LAW, 0), (PowerLaw(0.5, mu_t=2.0), 0.5), (Viscous(normal=2, tangential=1), 1)],
+    [(LAW, 0), (colloc.PowerLaw(0.5, mu_t=2.0), 0.5), (Viscous(normal=2, tangential=1), 1)],
     ids=str,
 )
 def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
@@ -87,6 +76,60 @@ def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
         for pace in (1.0, 3.0)
     )
     np.testing.assert_allclose(fast, 3.0 ** (1 + degree) * slow, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [LAW, colloc.PowerLaw(0.5, mu_t=2.0, mu_f=1.0, mu_b=1.0), Viscous(normal=2, tangential=1)],
+    ids=str,
+)
+def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
+    """So the driven power is smooth there: half of any power is gained, whichever way."""
+    (angles, rates), delta = random_instants(20), 1e-2
+    idle = law.largest * delta ** (1 + law.degree)
+    forces = BODY.forces(law, angles, rates, np.zeros((3, 20)), delta)
+    held = joint_moments(BODY, angles, forces)
+
+    def driven(share):
+        return DRIVEN_WORK.at(Instants(BODY, law, angles, share * rates, delta, moments=held))[0]
+
+    np.testing.assert_allclose(driven(0.0), 2 * 0.5 * idle, rtol=1e-12)
+    h = 1e-5 * idle
+    slope = (driven(h) - driven(-h)) / (2 * h)
+    power = Instants(BODY, law, angles, rates, delta, moments=held).power.sum(axis=0)
+    np.testing.assert_allclose(slope, 0.5 * power, rtol=1e-6)
+
+
+def test_a_joint_holds_no_more_than_friction_and_a_slope_pull_on_its_lighter_side():
+    """Both across a straight body: at the middles of its links, or at its feet."""
+    bound = largest_moments(Chain(masses=(0.2, 0.3, 0.5)), Friction(mu_t=2.0), 0.3)
+    assert bound == pytest.approx([(2.0 / 3 + 0.3 * mass) / 6 for mass in (0.2, 0.5)])
+    aside = [colloc.Foot(0, 0.8, offset=side * 0.2) for side in (1, -1)]
+    bound = largest_moments(Chain((0.5, 0.5), feet=[*aside, colloc.Foot(1, 0.9)]), Friction(), 0.3)
+    assert bound == pytest.approx([0.5 * (0.1 + 0.2) + 0.3 * 0.5 * 0.25])
+
+
+def test_torques_are_limited_both_ways_and_powers_one_way():
+    """In the program's bounds and in a replay: a gait in a mirror needs the same torques."""
+    np.testing.assert_array_equal(ONE.least, [-1.0, -1.0, -np.inf, -np.inf])
+    limits = {"torque_limit": 0.1, "power_limit": 0.5}
+    program = program_of(Problem("limited", gait=Harmonic(1), intervals=6, **limits))
+    rows = program.groups[ACTUATORS]
+    assert set(program.row_upper[rows]) == {1.0}
+    assert sorted(set(program.row_lower[rows])) == [-np.inf, -1.0]
+    assert np.mean(program.row_lower[rows] == -1.0) == 0.5
+    gait = Fourier([0.5, 0.2], [[1.2], [0.3]], [[0.2], [1.0]])
+    mirrored = Fourier(-gait.mean, -gait.cos, -gait.sin)
+    t = np.arange(400) / 400
+    signed, _ = moments(BODY, LAW, *gait(t), 1e-2)
+    # which is what makes a difference here
+    assert np.abs(signed.max(axis=1) + signed.min(axis=1)).max() > 0.01
+    found, other = (
+        replay(BODY, LAW, each, 1e-2, instants=400, limits=ONE, tolerance=1e-4).shares
+        for each in (gait, mirrored)
+    )
+    np.testing.assert_allclose(found, other, rtol=1e-9)
+    np.testing.assert_allclose(found[:2], np.abs(signed).max(axis=1), rtol=1e-2)
 
 
 @pytest.fixture(scope="module")

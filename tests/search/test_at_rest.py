@@ -70,7 +70,6 @@ def smallest(found):
 def test_below_a_saddle_lies_an_optimum(saddle):
     assert saddle.optimal
     assert saddle.objective == pytest.approx(-0.04614, abs=2e-5)
-    assert smallest(saddle) == pytest.approx(-0.81, abs=0.02)
     below = leave_saddle(saddle)
     assert smallest(below) > 0
     assert below.objective < 2 * saddle.objective

@@ -4,17 +4,8 @@ fold: certified."""
 import numpy as np
 import pytest
 
-from colloc import (
-    Chain,
-    Corners,
-    Fourier,
-    Friction,
-    Harmonic,
-    NotConvergedError,
-    Polygon,
-    Problem,
-    ellipse,
-)
+import colloc
+from colloc import Chain, Corners, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
 from colloc.gaits.starts import latin_hypercube_gait
 from colloc.results.solution import SOLVED
 from colloc.search.iterate import evaluate_at, space_near
@@ -74,7 +65,7 @@ def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
 
 def test_a_gait_whose_finer_mesh_has_no_balance_is_kept_and_says_so(monkeypatch):
     def fails(*_):
-        raise NotConvergedError("the balance did not converge.")
+        raise colloc.NotConvergedError("the balance did not converge.")
 
     gait = ellipse(A0=0, A1=2.8, B1=1.3)
     problem = Problem("coarse", gait, gait=Harmonic(1, "bilateral"), intervals=8)

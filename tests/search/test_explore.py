@@ -7,19 +7,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from colloc import Chain, Foot, Friction, Harmonic, Polygon, Problem, Viscous, Wheel, ellipse
+import colloc
+from colloc import Chain, Foot, Friction, Harmonic, Polygon, Problem, Viscous, Wheel, load, save
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.contact import crossing_depth
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.distinct_optima import distance
-from colloc.results.store import load, save
 from colloc.search import explore
 from colloc.search import solve as stages
 from colloc.search.checkpoint import Run
 from colloc.search.explore import multistart
 from colloc.search.small_starts import small_loops
 from colloc.search.solve import solve
-from colloc.system.errors import NotConvergedError
 
 UNEQUAL = Problem(
     "unequal", None, Chain((0.3, 0.2, 0.15, 0.35)), Friction(mu_t=2, mu_f=1, mu_b=1.4), Harmonic(2)
@@ -46,7 +45,7 @@ def test_the_answer_is_the_best_gait_of_finite_size_and_a_better_one_that_shrank
     assert max(finite) == pytest.approx(solution.value, rel=1e-3)
 
 
-GAIT = ellipse(0.0, 2.0, 1.0)
+GAIT = colloc.ellipse(0.0, 2.0, 1.0)
 FOUR = (22 / 104, 30 / 104, 30 / 104, 22 / 104)
 WITHIN = {"joint_limit": np.radians(85)}
 
@@ -117,7 +116,7 @@ def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkey
     on ten thousand intervals."""
     follow = explore.follow
     monkeypatch.setattr(explore, "follow", lambda *at: replace(follow(*at), violation=0.5))
-    with pytest.raises(NotConvergedError, match="no gait could be followed"):
+    with pytest.raises(colloc.NotConvergedError, match="no gait could be followed"):
         explore.explore(Problem("broken", gait=Harmonic(1, "bilateral")), 2)
 
 

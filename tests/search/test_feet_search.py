@@ -8,12 +8,12 @@ import pytest
 from scipy.optimize import root
 from shared.instants import random_instants
 
-from colloc import Chain, Elliptic, Foot, Friction, Problem, ProblemError, Wheel, solve_balance
+import colloc
+from colloc import Chain, Elliptic, Foot, Fourier, Friction, Problem, ProblemError, Wheel
 from colloc.bounds.motions import Domain
 from colloc.bounds.optimality_gap import refusal
 from colloc.commands.solve import summary_lines
 from colloc.dynamics.control_problem import control_problem
-from colloc.gaits.harmonic import Fourier
 from colloc.pictures.movie import frames
 from colloc.results.motion import friction_arrows
 from colloc.verification.replay import replay
@@ -95,7 +95,9 @@ def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says(
     assert 0.1 < law.smallest < 10
     assert Problem.from_dict(other.with_(friction=law).to_dict()).law == law
     angles, rates = random_instants(20)
-    z, same, again = (solve_balance(wheels, own, angles, rates, 1e-3).z for own in (*laws, law))
+    z, same, again = (
+        colloc.solve_balance(wheels, own, angles, rates, 1e-3).z for own in (*laws, law)
+    )
     np.testing.assert_array_equal(z, same)
     np.testing.assert_allclose(z, again, atol=1e-9)
     stated, resolved = (

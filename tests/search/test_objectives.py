@@ -4,8 +4,10 @@ and what must be reached."""
 import numpy as np
 import pytest
 
-from colloc import Fourier, Friction, Harmonic, Objective, Problem, ellipse, load, replay, save
+import colloc
+from colloc import Chain, Fourier, Friction, Harmonic, Objective, Problem, ellipse, replay
 from colloc.commands.results import verify
+from colloc.commands.solve import summary_lines
 from colloc.gaits.objective import SPEED
 from colloc.search.solve import solve
 
@@ -39,7 +41,7 @@ def test_the_fastest_gait_is_faster_and_less_efficient_and_the_replay_says_so(us
 
 
 def test_a_result_says_what_it_is_best_at_and_comes_back_from_its_file(fast, tmp_path, capsys):
-    again = load(save(fast, tmp_path / "fast.h5"))
+    again = colloc.load(colloc.save(fast, tmp_path / "fast.h5"))
     assert again.problem.objective == SPEED
     assert again.value == fast.value
     assert again.certificate == fast.certificate
@@ -52,12 +54,14 @@ def test_a_least_distance_is_reached_for_the_price_of_efficiency():
     usual = {"gait": Harmonic(1, "bilateral"), "friction": Friction(mu_t=3, mu_f=1, mu_b=1)}
     free = solve(Problem("free", ellipse(0.0, 1.2, 0.8), **usual), 1)
     least = 1.05 * free.distance
-    far = solve(free.problem.with_(at_least={"distance": least}, guess=free.gait), 1)
+    far = solve(free.problem.with_(least_distance=least, guess=free.gait), 1)
     assert free.success
     assert far.success
     assert far.certificate.distance == pytest.approx(least, rel=1e-4)
     assert far.certificate.efficiency < free.certificate.efficiency
     assert "least distance" in {check.name for check in far.certificate.checks}
+    stated = free.problem.with_(at_least={"distance": least})
+    assert far.problem.at_least == stated.at_least
 
 
 def test_a_turning_gait_turns_by_the_prescribed_angle():
@@ -114,3 +118,37 @@ def test_every_joint_has_a_limit_of_its_own():
     same = [{"gait": Harmonic(1, "bilateral"), "joint_limit": limit} for limit in (1.0, (1.0, 1.0))]
     values = [solve(problem.with_(guess=None, **changes), 1).value for changes in same]
     assert values[0] == values[1]
+
+
+SLIPPERY = {"gait": Harmonic(1, "bilateral"), "delta": 1e-2, "friction": Friction(0.3, 0.3, 0.3)}
+
+
+def test_where_the_farthest_gait_goes_less_half_of_its_distance_is_asked_for():
+    """A long link between two short ones."""
+    problem = Problem("stiff", body=Chain((0.2, 0.6, 0.2)), least_distance=0.1, **SLIPPERY)
+    farthest = solve(problem.with_(objective="distance", least_distance=None), 8)
+    solution = solve(problem, 8)
+    assert farthest.success
+    assert solution.success
+    ((aim, least),) = solution.problem.at_least
+    assert aim.name == "distance"
+    # how far the farthest goes is known on a coarse mesh
+    assert least == pytest.approx(0.5 * farthest.distance, rel=0.1)
+    assert solution.distance >= least * (1 - 1e-6)
+    assert f"The farthest gait goes {2 * least:.3g} body lengths" in solution.message
+    assert f"so half of that was: {least:.3g}" in solution.message
+
+
+def test_the_full_program_by_itself_keeps_it_too():
+    problem = Problem("far", body=Chain((0.25,) * 4), least_distance=0.22, **SLIPPERY)
+    solution = solve(problem, search="full")
+    assert [least for _, least in solution.problem.at_least] == [0.22]
+
+
+def test_the_first_line_of_a_gait_that_nobody_sees_says_so():
+    problem = Problem(
+        "twitch", guess=colloc.ellipse(0, 0.06, 0.05), smallest_shape_speed=0.02, **SLIPPERY
+    )
+    solution = colloc.evaluate(problem, problem.guess)
+    assert solution.is_tiny
+    assert "tiny gait" in summary_lines(solution, None)[0]

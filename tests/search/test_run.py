@@ -18,17 +18,15 @@ import pytest
 import colloc
 from benchmarks.kills import command as solve_command
 from benchmarks.kills import contents
-from colloc import BSpline, Chain, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse
+from colloc import BSpline, Chain, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse, load
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import is_visible, on_speed_floor
-from colloc.results.store import load
 from colloc.search import checkpoint as ahead
 from colloc.search.checkpoint import ROWS, STAGES, Ahead, Run
 from colloc.search.explore import explore, first_optimum, sketch
 from colloc.search.optimise import descend
 from colloc.search.options import SearchOptions
 from colloc.search.solve import choose, solve
-from colloc.system.errors import ReadOnlyRunWarning, StoreError
 from colloc.system.files import run_file
 from colloc.system.row_file import put_rows, read_rows
 
@@ -236,25 +234,6 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
     assert "begin again (solve --fresh)" in capsys.readouterr().err
     assert main([*command, "--fresh"]) in (0, 4)
     assert not run.exists()
-
-
-def test_a_run_that_cannot_be_written_is_told_once_and_is_written_at_the_end_if_there_is_room(
-    tmp_path, monkeypatch, at_once
-):
-    path, tries = tmp_path / "x.run.sqlite", []
-
-    def full(*given):
-        tries.append(given)
-        if len(tries) == 1:
-            raise StoreError("cannot write: no space left on device.")
-        put_rows(*given)
-
-    monkeypatch.setattr("colloc.search.checkpoint.put_rows", full)
-    with pytest.warns(ReadOnlyRunWarning, match="no space left") as told:
-        solution = solve(QUICK, 2, keep=path)
-    assert solution.certificate.replayed
-    assert (len(told), len(tries)) == (1, 2)
-    assert len(read_rows(path, ROWS)) > 5
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits")

@@ -6,20 +6,16 @@ import runpy
 import numpy as np
 import pytest
 
+import colloc
+from colloc import Concertina, Corners, CrawlerBody, Friction, Polygon, Problem, load, save
 from colloc.commands.main import main as colloc_main
-from colloc.gaits.bspline import Corners, Polygon
-from colloc.gaits.problem import Problem
-from colloc.mechanics.friction import Friction
 from colloc.reduced.program import ReducedProgram
-from colloc.results.solution import Solution
-from colloc.results.store import load, save
 from colloc.search.confirm import answer_of_iterate
 from colloc.search.iterate import evaluate_at, space_near
 from colloc.search.optimise import optimise
 from colloc.search.options import COARSE
 from colloc.search.solve import solve
-from colloc.smooth.crawler_body import LAP, CrawlerBody
-from colloc.smooth.prescribed_body import Concertina
+from colloc.smooth.crawler_body import LAP
 from scripts.continue_epsilon import Crawler, delta_for, epsilon_point, fitted_order
 
 BODY = CrawlerBody(0.05, panels=16)
@@ -72,7 +68,9 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     guess = Corners(body.concertina(1.2), "antipodal")
     gait, at = Polygon(8, "antipodal"), {"delta": 1e-3, "delta_start": 1e-3}
     problem = Problem("paper", guess, body=body, gait=gait, **at)
-    solution = Solution(problem, answer_of_iterate(evaluate_at(*space_near(problem, guess), 1e-3)))
+    solution = colloc.Solution(
+        problem, answer_of_iterate(evaluate_at(*space_near(problem, guess), 1e-3))
+    )
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (
         ("report", ""),

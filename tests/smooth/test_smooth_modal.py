@@ -4,17 +4,12 @@ and what they beat."""
 import numpy as np
 import pytest
 
+from colloc import Fourier, Friction, Harmonic, ModalBody, Problem, Wave, load, save
 from colloc.dynamics.control_problem import control_problem
-from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.problem import Problem
-from colloc.mechanics.friction import Friction
 from colloc.reduced.linear_space import LinearSpace
 from colloc.results.distinct_optima import distance, reversed_in_time, swap_ends
-from colloc.results.store import load, save
 from colloc.search.solve import solve
 from colloc.smooth.balance import Motion, solve_smooth
-from colloc.smooth.modal_body import ModalBody
-from colloc.smooth.prescribed_body import Wave
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.transcription.shape_constraints import shape_checks
 from scripts.models.period import measured_period

@@ -4,8 +4,7 @@ nothing stops."""
 import itertools
 import json
 import tracemalloc
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import h5py
@@ -13,7 +12,8 @@ import numpy as np
 import pytest
 from shared.store_samples import GAIT
 
-from colloc import BSpline, Chain, Corners, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
+import colloc
+from colloc import BSpline, Chain, Fourier, Friction, Harmonic, Problem, StoreError, ellipse
 from colloc.commands.families import multistart, starts_summary
 from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.problem_file import read_problem_file
@@ -41,7 +41,7 @@ from colloc.search.certify import is_trivial
 from colloc.search.options import Tolerances
 from colloc.search.solve import solve
 from colloc.studies import solve as campaign
-from colloc.system.errors import StoreError
+from colloc.system.task_pool import Lost
 from colloc.verification.replay import replay
 from tests.shared.laws import coulomb
 from tests.shared.stages import answer_near
@@ -161,11 +161,11 @@ def test_basins_join_images_of_one_gait_and_nothing_else():
 
 
 SPLINE = BSpline(6).member(np.linspace(0.1, 1.3, 12) ** 2, 2)
-CORNERS = Corners([[0.1, 1.3, 1 / 3], [0.0, 0.2, 0.9]])
+CORNERS = colloc.Corners([[0.1, 1.3, 1 / 3], [0.0, 0.2, 0.9]])
 
 
 @pytest.mark.parametrize(
-    ("kind", "gait"), [(Harmonic(2), GAIT), (BSpline(6), SPLINE), (Polygon(3), CORNERS)]
+    ("kind", "gait"), [(Harmonic(2), GAIT), (BSpline(6), SPLINE), (colloc.Polygon(3), CORNERS)]
 )
 def test_an_archive_comes_back_to_the_bit_with_gaits_of_every_class(kind, gait, tmp_path):
     path, stated = tmp_path / "sub" / "a.h5", problem(gait=kind, guess=gait)
@@ -242,29 +242,14 @@ def test_a_start_without_time_for_its_first_step_ends_at_the_time_limit(monkeypa
     assert (slow.status, slow.message) == (TIME_LIMIT, "gave up after 1e-09 s; no optimum yet.")
 
 
-class _Dying(Executor):
-    """Breaks, like a pool whose worker was killed, whenever start 2 is submitted."""
+def test_a_worker_that_dies_costs_one_start(monkeypatch):
+    def run_tasks(function, ready, **_):
+        while (task := ready()) is not None:
+            yield task, Lost("its worker died") if task.key == 2 else outcome(task.key)
 
-    def __init__(self, workers):
-        self.broken = False
-
-    def submit(self, function, *arguments):
-        if self.broken:
-            raise BrokenProcessPool("died")
-        future = Future()
-        if arguments[3] == 2:
-            self.broken = True
-            future.set_exception(BrokenProcessPool("died"))
-        else:
-            future.set_result(outcome(arguments[3]))
-        return future
-
-
-@pytest.mark.parametrize("workers", [1, 2, 5])
-def test_a_worker_that_dies_costs_one_start(workers):
-    how = {"workers": workers, "executor": _Dying}
-    found = list(campaign.run_starts(Archive(problem()), range(6), **how))
-    assert sorted(o.start for o in found) == [0, 1, 2, 3, 4, 5]
+    monkeypatch.setattr(campaign, "run_tasks", run_tasks)
+    found = list(campaign.run_starts(Archive(problem()), range(6)))
+    assert [o.start for o in found] == [0, 1, 2, 3, 4, 5]
     assert [o.start for o in found if o.status == CRASHED] == [2]
 
 

@@ -7,19 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from colloc import (
-    Chain,
-    Fourier,
-    Friction,
-    Harmonic,
-    Objective,
-    Problem,
-    Robot,
-    evaluate,
-    load,
-    pareto_front,
-    replay,
-)
+import colloc
+from colloc import Chain, Friction, Harmonic, Objective, Problem, Robot, load, pareto_front, replay
 from colloc.commands.main import main
 from colloc.pictures.figure import plot_front
 from colloc.search.solve import solve
@@ -113,8 +102,8 @@ def test_an_objective_that_certificates_do_not_know_is_measured():
 
 
 def test_a_gait_that_turns_is_as_far_whether_its_certificate_knows_the_objective_or_not():
-    bent = Fourier([1.0, 1.1], [[-1.0], [0.7]], [[1.0], [0.9]])
-    point = evaluate(Problem("bent", delta=1e-2), bent)
+    bent = colloc.Fourier([1.0, 1.1], [[-1.0], [0.7]], [[1.0], [0.9]])
+    point = colloc.evaluate(Problem("bent", delta=1e-2), bent)
     assert abs(point.rotation) > 0.3
     aims = Objective("distance"), Objective("distance * driven_work / driven_work")
     ((known, measured),) = ParetoFront(point.problem, aims, (point,)).values

@@ -16,7 +16,7 @@ import pytest
 from shared.store_samples import load_study
 
 import colloc
-from colloc import BSpline, Chain, Corners, Fourier, Friction, Harmonic, Polygon, Problem, ellipse
+from colloc import Axis, Chain, Fourier, Friction, Harmonic, Problem, ProblemError, Study, ellipse
 from colloc.commands.families import sweep as main
 from colloc.commands.families import sweep as sweep_study
 from colloc.commands.families import sweep_summary
@@ -42,9 +42,8 @@ from colloc.studies.cell import (
     value_of,
 )
 from colloc.studies.gait_class import class_name, gait_class, wave_direction, winding
-from colloc.studies.study import Axis, Study, read_study_file
+from colloc.studies.study import read_study_file
 from colloc.studies.sweep import NO_PROBLEM, StudyRun, save_study, study_table
-from colloc.system.errors import ProblemError
 from colloc.system.task_pool import Lost
 from colloc.verification.replay import replay
 
@@ -380,8 +379,8 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
 
 CLASSES = {
     "ellipse": Harmonic(1, "bilateral"),
-    "triangle": Polygon(3, "bilateral"),
-    "spline": BSpline(8, symmetry="bilateral"),
+    "triangle": colloc.Polygon(3, "bilateral"),
+    "spline": colloc.BSpline(8, symmetry="bilateral"),
 }
 
 
@@ -403,7 +402,7 @@ def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_ke
     finished(run)
     ellipses, triangles, splines = (run.cells[k,] for k in range(3))
     kinds = [type(cell.best.outcome.gait) for cell in (ellipses, triangles, splines)]
-    assert kinds == [Fourier, Corners, Combination]
+    assert kinds == [Fourier, colloc.Corners, Combination]
     # the ellipse was looked at in both other classes, as it is
     for cell in (triangles, splines):
         score = cell.scores[ellipses.best.gait_key]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shared.store_samples import HDF5_KINDS, Samples
 
 from benchmarks.tables import cached
-from colloc.system.errors import StoreError
+from colloc import StoreError
 from colloc.system.row_file import CACHE, put_rows, read_rows
 from colloc.system.store_file import array, attribute, mark, new_file, open_file, put, put_attribute
 

@@ -5,18 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+import colloc
 from benchmarks.error_control import CASES, case_problem, held, outcome
-from colloc import (
-    Chain,
-    Fourier,
-    Friction,
-    Harmonic,
-    Problem,
-    ellipse,
-    replay,
-    solve,
-    solve_balance,
-)
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, ellipse, replay, solve
 from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics.balance import instant
 from colloc.mechanics.contact import crossing_depth
@@ -142,7 +133,7 @@ def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     # 0)
     np.testing.assert_allclose(np.sort(0.5 - kinks), kinks, atol=2e-4)
     angles, rates = GAIT(kinks)
-    z = solve_balance(stated.body, friction, angles, rates, DELTA).z
+    z = colloc.solve_balance(stated.body, friction, angles, rates, DELTA).z
     slow = np.abs(instant(stated.body, friction, angles, rates, z, DELTA).velocity.vs).min(axis=0)
     assert (slow < 30 * DELTA).all()
 

@@ -5,20 +5,9 @@ import pytest
 from scipy.optimize import brentq, root
 from shared.points import wrench
 
-from colloc import (
-    Chain,
-    Corners,
-    Foot,
-    Fourier,
-    Friction,
-    Pad,
-    Wheel,
-    ellipse,
-    replay,
-    slope_motion,
-)
+import colloc
+from colloc import Chain, Corners, Foot, Fourier, Friction, Pad, Wheel, replay, slope_motion
 from colloc.gaits.regime import Regime
-from colloc.system.errors import NotConvergedError, ProblemError
 from tests.shared.laws import coulomb
 
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
@@ -120,7 +109,7 @@ def test_joints_at_rest_rest_on_any_slope_that_friction_holds():
     wheels = Chain(feet=tuple(Wheel(link, sideways=0.9) for link in range(3)))
     for body, grade in ((Chain(), 1.2), (wheels, 0.9)):
         said = f"slides down for ever: friction holds at most {grade} times"
-        with pytest.raises(ProblemError, match=said):
+        with pytest.raises(colloc.ProblemError, match=said):
             slope_motion(body, Friction(1.2, 1.2, 1.2), still, 1e-6, grade)
 
 
@@ -131,7 +120,7 @@ def test_skates_hold_across_the_slope_and_not_along():
     skates = Friction(mu_t=10, mu_f=0.1, mu_b=0.1)
     across = slope_motion(Chain(), skates, straight, 1e-6, 0.5, heading=np.pi / 2)
     assert across.climb[0] == pytest.approx(-1e-6 * 0.5 / np.sqrt(10**2 - 0.5**2), rel=1e-4)
-    with pytest.raises(NotConvergedError, match="friction may be too weak"):
+    with pytest.raises(colloc.NotConvergedError, match="friction may be too weak"):
         slope_motion(Chain(), skates, straight, 1e-6, 0.5, heading=0.0)
 
 
@@ -140,7 +129,7 @@ def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
     """Backwards in time, and read from the other end, it is the same gait; the slope is turned over
     with the friction. So the map of headings is its own inverse, and a monotone one that is must be
     none."""
-    at = Chain(), coulomb(*mu), ellipse(A0=0.4, A1=1.5, B1=1.0), 1e-2
+    at = Chain(), coulomb(*mu), colloc.ellipse(A0=0.4, A1=1.5, B1=1.0), 1e-2
 
     def ran(heading, grade=0.3):
         return slope_motion(*at, grade, heading=heading, tolerance=1e-5)
