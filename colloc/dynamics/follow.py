@@ -46,31 +46,37 @@ def integrate_period(
     tolerance: np.ndarray | float,
     breaks: tuple[float, ...] = (),
     longest: float = np.inf,
+    jacobian: Callable[[float, np.ndarray], np.ndarray] | None = None,
 ) -> Course:
     """Follow states from `begin` ``(n_state,)`` at phase 0 to 1, each to about a tolerance, by
     steps no longer than `longest`; `NotConvergedError` if the solver cannot go on.
 
     rates: of a phase, the states and what it last said to remember (None at first), such as
     velocities from which the next balance may start: their rates, and what to remember. breaks:
-    phases in (0, 1), ascending, at which the rates jump.
+    phases in (0, 1), ascending, at which the rates jump. jacobian: derivatives of the rates
+    ``(n_state, n_state)`` at a phase; by default from differences, one evaluation a state.
     """
     from scipy.integrate import OdeSolution, solve_ivp
 
     near: Any = None
     first = last = left = 0.0
 
+    def inside(t: float) -> float:
+        return min(max(t, first + ONE_SIDED), last - ONE_SIDED)  # rates may jump at the ends
+
     def slope(t: float, state: np.ndarray) -> np.ndarray:
         nonlocal near, left
         left -= 1
         if left < 0:
             raise _TooOften
-        one_sided = min(max(t, first + ONE_SIDED), last - ONE_SIDED)  # rates may jump at the ends
-        found, near = rates(one_sided, state, near)
+        found, near = rates(inside(t), state, near)
         return found
+
+    exact = jacobian and (lambda t, state: jacobian(inside(t), state))
 
     phases, states, ends, pieces, state = [], [], [0.0], [], begin
     for first, last in pairwise([0.0, *breaks, 1.0]):
-        accuracy = {"rtol": 1e-13, "atol": STEP * tolerance, "max_step": longest}
+        accuracy = {"rtol": 1e-13, "atol": STEP * tolerance, "max_step": longest, "jac": exact}
         for method, most in _METHODS:
             left = most
             giving_up = warnings.catch_warnings(action="ignore", category=UserWarning)

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.dynamics.chain import MomentaAt, balance_on_slope, joint_torques
+from colloc.dynamics.chain import MomentaAt, balance_on_slope, joint_torques, momenta_at
 from colloc.dynamics.follow import ONE_SIDED, STEP, Course, integrate_period
 from colloc.gaits.objective import Objective
 from colloc.gaits.period import chord_per_way
@@ -413,18 +413,45 @@ class GaitWithInertia(_Gait):
             start = np.append(start, [self.theta, 0.0, 0.0, 0.0])
 
         def rates(t: float, states: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            states, (angles, rates) = states.reshape(-1, 7), self.path(np.array([t]))
-            at = angles[:, 0], rates[:, 0], states[:, _MOMENTA]
-            now = self._momenta_of(len(states))(*at)
-            if self.regime.slides:
-                pull: Any = self.regime.pull(states[None, :, _THETA])
-                now[:, -3:-1] += pull.T / self.froude
-            moved = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
-            place = moved.real, moved.imag
-            out = np.column_stack([now[:, 6:], now[:, 2] - self.turn, *place, now[:, 5]])
-            return out.ravel(), None
+            return self.rates(t, states), None
 
-        return integrate_period(rates, start.ravel(), aim, self.breaks)
+        return integrate_period(rates, start.ravel(), aim, self.breaks, jacobian=self.jacobian)
+
+    def rates(self, t: float, states: np.ndarray) -> np.ndarray:
+        """Rates ``(7 n,)`` of n motions' states at a phase."""
+        states, (angles, rates) = states.reshape(-1, 7), self.path(np.array([t]))
+        at = angles[:, 0], rates[:, 0], states[:, _MOMENTA]
+        now, out = self._momenta_of(len(states))(*at), np.empty_like(states)
+        if self.regime.slides:
+            now[:, -3:-1] += self._pull(states).T
+        moved = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
+        out[:, _MOMENTA], out[:, _THETA] = now[:, 6:], now[:, 2] - self.turn
+        out[:, 4], out[:, 5], out[:, _WORK] = moved.real, moved.imag, now[:, 5]
+        return out.ravel()
+
+    def jacobian(self, t: float, states: np.ndarray) -> np.ndarray:
+        """Derivatives ``(7 n, 7 n)`` of `rates` along the states."""
+        states = states.reshape(-1, 7)
+        n, shapes = len(states), self.path(np.full(len(states), t))
+        at = self.body, self.friction, (*shapes, self.delta), states[:, _MOMENTA].T, self.froude
+        now, slopes = momenta_at(*at, along_states=True)
+        axis, each = np.exp(1j * states[:, _THETA]), np.arange(n)
+        moved, moving = axis * (now[3] + 1j * now[4]), axis * (slopes[3] + 1j * slopes[4])
+        by_state = np.zeros((7, 7, n))
+        by_state[_MOMENTA, _MOMENTA], by_state[_THETA, _MOMENTA] = slopes[6:], slopes[2]
+        by_state[4, _MOMENTA], by_state[5, _MOMENTA] = moving.real, moving.imag
+        by_state[4, _THETA], by_state[5, _THETA] = -moved.imag, moved.real
+        by_state[_WORK, _MOMENTA] = slopes[5]
+        if self.regime.slides:  # the pull turns against the body
+            pull = self._pull(states)
+            by_state[0, _THETA], by_state[1, _THETA] = pull[1], -pull[0]
+        apart = np.zeros((n, 7, n, 7))
+        apart[each, :, each] = by_state.transpose(2, 0, 1)
+        return apart.reshape(7 * n, 7 * n)
+
+    def _pull(self, states: np.ndarray) -> np.ndarray:
+        """Force of the weight along the slope over the Froude number, ``(2, n)``."""
+        return np.asarray(self.regime.pull(states[None, :, _THETA])) / self.froude
 
     def instants(self, t: np.ndarray, states: np.ndarray) -> Instants:
         of = self.body, self.friction

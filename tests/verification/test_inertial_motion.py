@@ -8,6 +8,7 @@ from shared.points import wrench
 
 import colloc
 from colloc.dynamics.slow_enough import SCHEME, efficiency_at
+from colloc.gaits.regime import Regime
 from colloc.mechanics.inertia import momentum_rates
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
@@ -248,3 +249,17 @@ def test_a_gait_that_inertia_makes_better_is_slow_enough_up_to_where_it_is_by_th
     slow = colloc.replay(CHAIN, ISOTROPIC, gait, 1e-2).efficiency
     played = with_inertia(CHAIN, ISOTROPIC, gait, 1e-2, froude, tolerance=1e-4)
     assert played.efficiency / slow - 1 == pytest.approx(0.05, rel=0.05)
+
+
+@pytest.mark.parametrize("grade", [0.0, 0.2])
+def test_jacobian_of_the_states_is_the_derivative_of_their_rates(grade):
+    # two motions side by side, which know nothing of each other
+    moving = GaitWithInertia(
+        colloc.Chain((0.2, 0.5, 0.3)), colloc.Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5),
+        colloc.ellipse(A0=0.3, A1=1.0, B1=0.7), 1e-2, froude=0.1, regime=Regime(grade=grade),
+    )  # fmt: skip
+    states, h = np.random.default_rng(0).normal(size=14), 1e-6
+    step = [moving.rates(0.3, states + s) - moving.rates(0.3, states - s) for s in h * np.eye(14)]
+    np.testing.assert_allclose(
+        moving.jacobian(0.3, states), np.transpose(step) / (2 * h), atol=1e-7
+    )
