@@ -12,6 +12,7 @@ from colloc.mechanics.balance import balance_jacobian, instant, joint_moments, l
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import chain_motion, motion_and_derivatives
 from colloc.mechanics.native_kernel import native_kernel
+from colloc.results.motion import friction_arrows
 from tests.shared.without_kernel import numpy_instead
 
 LENGTHS, SKEW = (0.3, 0.45, 0.25), Friction(mu_t=0.5, mu_f=1, mu_b=2)
@@ -52,6 +53,13 @@ def rows(motion):
     return np.vstack([motion.z, motion.centre, motion.power])
 
 
+@each_dry_law
+def test_the_extremes_of_a_law_are_those_of_the_force_on_a_foot_that_slides_anywhere(law):
+    turns = np.arange(3600) * np.pi / 1800
+    force = np.hypot(*law.density(*np.round([np.cos(turns), np.sin(turns)], 12), 1e-6))
+    assert [force.min(), force.max()] == pytest.approx([law.smallest, law.largest], rel=1e-5)
+
+
 @each_body
 @each_law
 def test_friction_is_the_sum_over_the_points_that_touch(law, body):
@@ -63,6 +71,10 @@ def test_friction_is_the_sum_over_the_points_that_touch(law, body):
         np.testing.assert_allclose(said.force[:, k], net, atol=3e-7 * law.largest)
         assert said.power[0, k] == pytest.approx(power, rel=1e-6)
         assert complex(*said.centre[:, k]) == pytest.approx(centre)
+    if body.standing_on and not body.contact.pads:  # as pictures show it
+        (x, y), (fx, fy) = friction_arrows(body, law, angles, rates, 0.05, z)
+        net = [fx.sum(axis=0), fy.sum(axis=0), (x * fy - y * fx).sum(axis=0)]
+        np.testing.assert_allclose(net, said.force, atol=1e-12 * law.largest)
 
 
 @pytest.mark.parametrize("size", [0.0, 0.3])

@@ -6,7 +6,18 @@ from scipy.optimize import root
 from shared.instants import random_instants
 from shared.points import wrench
 
-from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Viscous, Wheel, solve_balance
+from colloc import (
+    Chain,
+    Foot,
+    Friction,
+    Harmonic,
+    Pad,
+    Problem,
+    ProblemError,
+    Viscous,
+    Wheel,
+    solve_balance,
+)
 from colloc.mechanics.native_kernel import native_kernel
 from tests.mechanics.test_chain_mechanics import BODIES, LAWS, LENGTHS, STANDS, each_law
 from tests.shared.without_kernel import numpy_instead
@@ -147,6 +158,17 @@ def test_forwards_of_a_foot_is_towards_the_head_and_turned_round_its_law_is_back
         for body, law in ((ahead, EQUAL), (on_each(lambda k: Foot(k, 0.3)), AHEAD))
     )
     np.testing.assert_allclose(own, theirs, rtol=0, atol=1e-8)
+
+
+def test_a_foot_turned_across_is_its_mirror_image_if_it_slides_alike_both_ways():
+    """And not under a law of the body's, which may have a forward direction."""
+    for law in (Friction(mu_t=1.0, mu_f=0.2, mu_b=0.2), AHEAD, None):
+        feet = Foot(0, friction=law, angle=np.pi / 2), Foot(1), Foot(2)
+        if law is None or not law.reversible:
+            with pytest.raises(ProblemError, match="differ between left and right"):
+                Chain(feet=feet)
+        else:
+            assert Chain(feet=feet).feet[0].angle == np.pi / 2
 
 
 def test_an_offset_is_to_the_left_seen_from_the_tail_and_to_the_right_seen_from_the_head():

@@ -5,6 +5,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from matplotlib.quiver import Quiver
 from PIL import Image
 
 import colloc
@@ -90,6 +91,22 @@ def test_robots_side_by_side_are_drawn_in_metres_and_seconds():
     (long, short), (_, again) = drawn[0], drawn[2]
     np.testing.assert_allclose(np.subtract(long, lines), 2 * np.subtract(short, lines), atol=9)
     np.testing.assert_allclose(again, short, atol=2)
+
+
+def test_friction_turns_with_a_body_that_turns_cycle_by_cycle(monkeypatch):
+    drawn, draw = [], Quiver.set_UVC
+
+    def kept(quiver, x, y, *colours):
+        drawn.append(np.array(x) + 1j * np.array(y))
+        draw(quiver, x, y, *colours)
+
+    gait = colloc.Fourier([1.0, 1.1], [[-1.0], [0.7]], [[1.0], [0.9]])
+    turning = colloc.evaluate(colloc.Problem("turns", delta=0.1, mesh_tolerance=1e-2), gait)
+    monkeypatch.setattr(Quiver, "set_UVC", kept)
+    assert len(list(pictures(turning, 2, 2, width=200))) == 4
+    assert abs(turning.rotation) > 0.1
+    first, then = np.split(np.array(drawn[-4:]), 2)
+    np.testing.assert_allclose(then, np.exp(1j * turning.motion.rotation) * first, atol=1e-9)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")

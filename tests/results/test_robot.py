@@ -11,11 +11,23 @@ import pandas
 import pytest
 
 import colloc
-from colloc import Fourier, Friction, Harmonic, Problem, ProblemError, evaluate, slope_motion, solve
+from colloc import (
+    Fourier,
+    Friction,
+    Harmonic,
+    Objective,
+    Problem,
+    ProblemError,
+    evaluate,
+    slope_motion,
+    solve,
+)
 from colloc.commands.main import main
+from colloc.gaits.objective import DRIVEN
 from colloc.pictures.report_page import report_page
 from colloc.results.motion import Arc, arc
 from colloc.results.robot import RobotSheet, in_si
+from colloc.studies.families import ParetoFront
 from colloc.verification.trajectory import plan_trajectory
 from tests.shared.inertia import played as with_inertia
 
@@ -302,8 +314,10 @@ def test_on_a_slope_less_than_the_weight_presses_and_all_of_it_is_transported(to
     assert facts["cost_of_transport"] == pytest.approx(work / (MASS * 9.81 * way), rel=1e-4)
     assert facts["froude_number"] == pytest.approx(LENGTH / (presses * 2000.0**2))
     robot = colloc.Robot(length=LENGTH, mass=MASS, period=2000.0)
-    stated = in_si(replace(towards_left, problem=towards_left.problem.with_(robot=robot)))
-    assert stated["friction_work_per_cycle_J"] == pytest.approx(work)
+    stated = replace(towards_left, problem=towards_left.problem.with_(robot=robot))
+    assert in_si(stated)["friction_work_per_cycle_J"] == pytest.approx(work)
+    front = ParetoFront(stated.problem, (Objective("distance"), DRIVEN), (stated,))
+    assert front.in_units[1][0, 1] == pytest.approx(MASS * presses / front.values[0, 1])
 
 
 def test_an_export_on_a_slope_is_of_the_shorter_robot_that_has_that_pace_there(unsolved, tmp_path):

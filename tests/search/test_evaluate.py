@@ -58,8 +58,9 @@ def filmed(path, time, lengths=LINKS, names="x_{} y_{}"):
 def test_points_of_the_body_tell_its_angles_and_how_far_it_went(time, tmp_path):
     body = colloc.Chain(LINKS)
     path = filmed(tmp_path / "film.csv", time)
-    angles = fitted_gait(path, 2, body=body).gait.angles(T)
-    np.testing.assert_allclose(angles, GAIT.angles(T), atol=1e-6)
+    fitted = fitted_gait(path, 2, body=body)
+    np.testing.assert_allclose(fitted.gait.angles(T), GAIT.angles(T), atol=1e-6)
+    assert fitted.went == pytest.approx(0.05, rel=1e-6)  # straight on beyond the last sample
     found = colloc.evaluate(PROBLEM.with_(body=body), path)
     assert "250 of them a body length" in found.message
     went = float(re.search(r"went ([\d.]+) body lengths a period", found.message)[1])

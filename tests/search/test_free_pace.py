@@ -72,6 +72,12 @@ def test_it_is_certified_kept_and_told(tmp_path):
     assert found.status == "solved", found.message
     # IPOPT confirms it, with the pace among its variables
     assert found.answer.program == found.problem.formulation
+    # and played slowly its period costs as much
+    stated, gait = found.problem, replace(found.gait, log_period=None)
+    slow = colloc.replay(stated.body, stated.law, gait, found.delta_per_period)
+    standing = 0.1 * np.exp(found.gait.log_period)
+    value = slow.distance / (slow.work + standing)
+    assert found.played_slowly == pytest.approx(value, rel=1e-5)
     kept = colloc.load(colloc.save(found, tmp_path / "free.h5"))
     assert kept.problem.froude == colloc.Free(0.01, 1.0)
     assert (kept.froude, kept.problem.hash) == (found.froude, found.problem.hash)
