@@ -172,7 +172,11 @@ def test_a_gait_below_the_play_of_the_joints_is_no_answer(slow_robot, over_swing
 def test_a_figure_of_a_robot_has_its_units(slow_robot):
     figure = slow_robot.plot()
     figure.draw_without_rendering()
-    lab, angles, speeds, power = figure.axes[1:]
+    strip, lab, angles, speeds, power = figure.axes
+    way = 62 * np.ptp(slow_robot.sample(np.array([0.0, 1.0])).centre[0])
+    assert strip.texts[-1].get_text() in (f"{way:.1f}", f"−{way:.1f}")
+    delta = slow_robot.delta_per_period * 62 / 600
+    np.testing.assert_allclose(speeds.lines[-1].get_ydata(), delta)
     assert "[cm]" in lab.get_xlabel()
     assert [axes.get_xlabel() for axes in (angles, speeds, power)] == 3 * ["time  [s]"]
     # a label is the number of its place, in the other unit

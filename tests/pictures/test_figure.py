@@ -86,6 +86,10 @@ def test_feet_wheels_and_pads_differ_and_the_key_says_which_is_which(unsolved):
         first, last = (np.array(line.get_data())[:, end::3] for end in (0, 1))
         off = np.arctan2(*(last - first)[::-1]) - [links[link] + angle for link, angle in wanted]
         np.testing.assert_allclose(np.sin(off), 0, atol=1e-9)
+    sliding = ~solution.holding(fine)[:, 0]
+    for kind, hollow in zip(("foot", "wheel", "pad"), axes.lines[-5::2], strict=True):
+        drawn = np.isfinite(hollow.get_xdata()).sum() / 2
+        assert drawn == (sliding & (np.array(KINDS) == kind)).sum()
 
 
 def test_a_figure_in_the_lab_says_of_how_many_periods_it_is(unsolved):

@@ -164,7 +164,11 @@ def test_what_inertia_takes_from_a_gait_that_turns_does_not_depend_on_where_its_
     """Its way does: the body wriggles about the circle that it follows."""
     turning = colloc.Fourier([1.2, 0.6], [[0.9], [0.1]], [[0.1], [0.9]])
     begun = [lambda t, s=shift: turning((t + s) % 1.0) for shift in (0.0, 0.3, 0.6)]
-    assert abs(colloc.replay(CHAIN, ISOTROPIC, turning, 1e-2).rotation) > 0.1
+    at, mesh = (CHAIN, ISOTROPIC, turning), Mesh(scheme(SCHEME), np.linspace(0, 1, 321))
+    turn = colloc.replay(*at, 1e-2).rotation
+    assert abs(turn) > 0.1
+    chord = colloc.replay(*at, 1e-2, turn=turn)
+    assert efficiency_at(*at, mesh, 1e-2)[0] == pytest.approx(chord.efficiency, rel=1e-4)
     paces = [colloc.slow_enough(CHAIN, ISOTROPIC, gait, 1e-2) for gait in begun]
     np.testing.assert_allclose(paces, paces[0], rtol=0.03)
 
