@@ -421,7 +421,7 @@ def in_elastica() -> dict[str, tuple[Fourier | None, np.ndarray]]:
 
 
 def replayed(body: Chain, gait: Fourier, froude: float) -> float:
-    """How far a snake goes in a period, with inertia."""
+    """How far a snake goes in a cycle, with inertia."""
     return replay(body, SNAKE, gait, 1e-3, tolerance=1e-5, froude=froude).distance
 
 
@@ -444,7 +444,7 @@ def elastica() -> list[Row]:
     for who, (gait, nodes) in in_elastica().items():
         body, shown = snakes.shapes(nodes)
         published, bend = round(snakes.distance(nodes), 4), largest_bend(shown)
-        what = f"{who}: body lengths a period, Froude number {froude:g}; its shapes replayed"
+        what = f"{who}: body lengths per cycle, Froude number {froude:g}; its shapes replayed"
         moved = replayed(body, shown, froude)
         rows.append(number(what, paper, published, moved, 0.002, f"bend up to {bend:.2f}"))
         if gait is not None:
@@ -456,7 +456,7 @@ def elastica() -> list[Row]:
         said = "{:.4f}; {:.4f}; {:.4f}".format
         gains = np.round(100 * np.divide(ours, theirs) - 100) + 0.0  # no minus at zero
         note = "{:+.0f} %; {:+.0f} %; {:+.0f} %".format(*gains)
-        what = f"slowly, {what}: body lengths a period; d/W; peak moment"
+        what = f"slowly, {what}: body lengths per cycle; d/W; peak moment"
         return Row(what, f"{paper}, its shapes replayed", said(*theirs), said(*ours), None, note)
 
     first, second, _ = (nodes for _, nodes in in_elastica().values())
@@ -483,7 +483,7 @@ def kinematic() -> list[Row]:
         coarse, fine = gone(50, froude), gone(100, froude)
         rows.append(
             number(
-                f"body lengths a period by the wave of its README, Froude number {froude:g}",
+                f"body lengths per cycle by the wave of its README, Froude number {froude:g}",
                 "kinematic-snake",
                 round(snakes.kinematic_distance(froude), 5),
                 fine + (fine - coarse) / 3,

@@ -16,7 +16,7 @@ each link's tangent angle less that of the link behind it, positive counter-cloc
 
 Names: ``s`` arc length, ``t`` time, ``delta`` regularisation speed of friction, ``epsilon``
 half-width of the bump of a concertina crawler, ``mu_t, mu_f, mu_b`` transverse, forward and
-backward friction coefficient, ``d`` distance per period, ``W`` work per period against friction,
+backward friction coefficient, ``d`` distance per cycle, ``W`` work per cycle against friction,
 ``efficiency`` = d/W (lambda in the paper).
 
 The paper: S. Alben, "Efficient sliding locomotion with isotropic friction" (2019).

@@ -1,6 +1,6 @@
 """The isotropic three-link crawler on splines of 24 knots, symmetric about angle 1 = -angle 2.
 
-Each coefficient changes a sixth of the period alone, so a path may bend sharply where that pays.
+Each coefficient changes a sixth of the cycle alone, so a path may bend sharply where that pays.
 The guess is the paper's best ellipse, of efficiency 0.260; classes of more freedom do far better
 (docs/gait_classes.md).
 """

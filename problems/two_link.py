@@ -6,7 +6,7 @@ than forward sliding.
 One joint can only retrace its path. If reversed rates reverse the motion (mu_f = mu_b) it goes
 nowhere, for any pacing and any delta: the scallop theorem (E. M. Purcell, Life at low Reynolds
 number, 1977), and the problem is refused. With mu_b > mu_f opening and closing differ. The gait is
-antipodal (angle(t + 1/2) = -angle(t)), so the second half period is the mirror image of the first
+antipodal (angle(t + 1/2) = -angle(t)), so the second half cycle is the mirror image of the first
 and net rotation vanishes.
 """
 

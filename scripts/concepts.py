@@ -94,7 +94,7 @@ def gaits_in_shape_space(ax: Axes, solutions: dict[str, Solution]) -> None:
 
 
 def bodies_of_a_gait(ax: Axes, solution: Solution, count: int = 6) -> None:
-    """One period as bodies, evenly spaced in time, each in the place of its own that its column
+    """One cycle as bodies, evenly spaced in time, each in the place of its own that its column
     gives it."""
     motion = solution.sample(np.linspace(0, 1, count))
     ends = lab_outline(solution.problem.body, motion)
@@ -118,7 +118,7 @@ def smoothed_friction(ax: Axes) -> None:
     speed = np.linspace(-0.05, 0.05, 1001)
     for delta, colour in ((1e-2, VERMILION), (1e-3, ORANGE), (1e-4, BLUE)):
         ax.plot(speed, -speed / np.hypot(speed, delta), color=colour, label=f"δ = {delta:g}")
-    ax.set(xlabel="speed of sliding [body lengths a period]", ylabel="friction / (μ x weight)")
+    ax.set(xlabel="speed of sliding [body lengths per cycle]", ylabel="friction / (μ x weight)")
     ax.legend()
 
 

@@ -197,7 +197,7 @@ def test_coefficients_that_are_equal_or_named_do_not_warn():
 
 
 SENTENCES = r"""
-Objective("1") | Objective("log(-1)") -> speaks of nothing
+Objective("1") | Objective("log(-1)") -> uses no quantity
 Objective("distance ** 1000") | Objective("0 * distance") -> too flat or too steep
 Objective("distance / work + 1/0") | Objective("distance * (-1) ** 0.5") -> no finite real number
 Quantity("heat", "sum(moment ** 2) * 9.0**9**9") -> no finite real number
@@ -210,7 +210,7 @@ OwnLaw([], "-vn") -> must be text
 Foot(0, friction=Friction) -> as Friction\(\)
 Problem("x", shrinking="no") -> shrinking must be True or False, not 'no'
 Concertina(backwards=1) -> backwards must be True or False
-Problem("x", at_least="distance") | Problem("x", at_least=[("distance", 0.1, 0.2)]) -> at_least names what must be reached
+Problem("x", at_least="distance") | Problem("x", at_least=[("distance", 0.1, 0.2)]) -> at_least must map objectives
 Problem("x", delta=1e308) -> delta .* at most 1000
 Axis("efficiency", (1, 2)) | Axis("joint", (1, 2)) -> not that of a column of the results
 Axis(None, (1, 2)) -> must be a Python name
@@ -350,10 +350,10 @@ OwnLaw("-vs/abs(vs + 1) - where(vs < 0, 0, 1e-9)", "-vn") -> rest
 OwnLaw("-vs/(speed - speed)", "-vn") -> no finite value
 OwnLaw("-vs/speed", "where(vs > 0, -2, -1.5)*vn/speed") -> jumps where vs changes its sign
 OwnLaw("-vs", "-vn - where(vn > 0, 1, -1)*where(vn*vn > 0, 1, 0)") -> jumps where vn changes its sign
-OwnLaw("-vs/speeed", "-vn") -> speaks of speeed
+OwnLaw("-vs/speeed", "-vn") -> uses speeed
 OwnLaw("-vs +", "-vn") -> is no formula
 OwnLaw("-vs.real", "-vn") -> is no formula that can be differentiated
-OwnLaw("__import__('os')", "-vn") -> is no formula|speaks of
+OwnLaw("__import__('os')", "-vn") -> is no formula|uses
 OwnLaw("-vs**vs", "-vn") -> exponent
 evaluate(PROBLEM, np.zeros((3, 20))) -> angles of 3 joints, and the body has 2
 evaluate(PROBLEM, np.full((2, 20), np.nan)) -> no finite angle of joint 1 at sample 1
@@ -440,14 +440,14 @@ limits=[PathLimit("speed", "rate", 9.0)], gait=Polygon(4) -> the speed is limite
 limits=["moment < 1"] | limits=3 -> PathLimit
 limits=[PathLimit("heat", "moment**2", -1.0)] | limits=[PathLimit("heat", "moment**2", "x")] -> must be positive
 objective="driven efficiency", formulation="implicit velocity" -> formulation 'full'
-objective=Objective("distance / heat") -> speaks of heat
+objective=Objective("distance / heat") -> uses heat
 objective=Objective("1 / mine", quantities=[Quantity("mine", "moment**2")]) -> no sum over the joints
 objective=Objective("1 / work", quantities=[Quantity("work", "sum(rate)")]) -> a name of its own
 froude=-1.0 | froude="fast" -> not negative
 froude=0.1, gait=MIRRORED -> run backwards
 froude=0.1, gait=Polygon(4) -> leaves the pace open
 froude=0.1, body=ModalBody(), gait=Harmonic(1) -> of a ModalBody
-froude=0.1, gait=Harmonic(1), grade=0.1, rotation=1.0 -> on a slope a body that a period turns
+froude=0.1, gait=Harmonic(1), grade=0.1, rotation=1.0 -> on a slope a body that a cycle turns
 froude=0.1, gait=Harmonic(1), grade=2.0 -> slides down for ever
 grade=1.0 -> slides down for ever
 froude=0.1, gait=Polygon(4), objective="driven efficiency" -> joint rates jump
@@ -462,10 +462,10 @@ froude=(0.1, 1.0), objective="1 / length" -> depends on it
 froude=(0.1, 1.0), objective="distance / period", gait=Polygon(4) -> of a class Harmonic
 objective="distance / period" -> state the pace
 grade=-1.0 | grade="steep" -> grade must be
-grade=0.1, gait=Polygon(symmetry="bilateral") -> no part of a period follows from another: take Polygon
+grade=0.1, gait=Polygon(symmetry="bilateral") -> no part of a cycle follows from another: take Polygon
 grade=0.1, body=CrawlerBody() -> only a Chain
-grade=0.1, objective="turning" -> the objective speaks of the rotation
-grade=0.1, rotation=0.1 -> a body that a period turns has no gait that repeats
+grade=0.1, objective="turning" -> the objective uses the rotation
+grade=0.1, rotation=0.1 -> a body that a cycle turns has no gait that repeats
 grade=0.1, formulation="implicit velocity" -> only the formulation 'full'
 grade=0.1, scheme="trapezoid" -> a gauss-N or radau-N scheme is needed
 grade=0.1, towards="up" -> towards must be a finite angle
@@ -495,7 +495,7 @@ objective="turning" -> rotation
 rotation=0.2, gait=MIRRORED -> bilateral gait turns
 rotation=np.inf -> rotation must be
 at_least={"distance": "far"} -> finite number
-at_least={"size": 1.0} -> speaks of size
+at_least={"size": 1.0} -> uses size
 body=ModalBody(2), guess=Fourier([0, 0], [[2], [0]], [[0], [0.1]]), gait=Harmonic(1) -> tangent at .* reaches
 body=ModalBody(4), guess=Fourier([0] * 3, [[1]] * 3, [[0]] * 3), gait=Harmonic(1) -> 3 modes but the body has 4
 body=ModalBody(4, "fourier"), gait=MIRRORED -> none or antipodal

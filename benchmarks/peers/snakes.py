@@ -74,7 +74,7 @@ def centre(nodes: np.ndarray) -> np.ndarray:
 
 
 def distance(nodes: np.ndarray) -> float:
-    """How far it went a period: the mean of the last four, which differ in the third digit."""
+    """How far it went per cycle: the mean of the last four, which differ in the third digit."""
     places = centre(nodes)[:, -1 - 4 * PER_PERIOD :: PER_PERIOD]
     return float(np.hypot(*np.diff(places, axis=1)).mean())
 
@@ -100,7 +100,7 @@ def film(snakes: dict[str, np.ndarray], periods: int = 3, width: int = 800) -> s
         z = (0.57 + 0.3j + z.conj().reshape(shown.shape[1:])) * scale + 1j * k * height
         frames = [" ".join(f"{p.real:.1f},{p.imag:.1f}" for p in at[::2]) for at in z.T]
         lanes += (
-            f'<text x="12" y="{k * height + 24}">{name}: {distance(nodes):.3f} body lengths a period'
+            f'<text x="12" y="{k * height + 24}">{name}: {distance(nodes):.3f} body lengths per cycle'
             '</text><polyline marker-end="url(#head)"><animate attributeName="points" '
             f'dur="{periods * PERIOD:g}s" repeatCount="indefinite" values="{";".join(frames)}"/>'
             "</polyline>"

@@ -59,7 +59,7 @@ def exit_code(command: Callable[[], int], *, as_json: bool = False) -> int:
         code, sentence = BAD_PROBLEM, str(error)
     except BrokenPipeError:
         code, as_json, output_fails = UNREAD, False, True
-        sentence = "nobody reads the output any more; what was saved before is kept."
+        sentence = "the output was closed by its reader; what was saved before is kept."
     except OSError as error:
         code, output_fails = BAD_PROBLEM, error.filename is None
         what = f"{error.filename or 'the output'}: {error.strerror or error}"

@@ -94,7 +94,7 @@ def starts_summary(
     _TIME_LIMIT,
     cli.RETRY,
     cli.BOUND,
-    cli.option(int, "--start N", "with an archive: make a result of start N"),
+    cli.option(int, "--start N", "with an archive: solve start N again and save it"),
     cli.VERBOSE,
     cli.output("folder, or .h5 file (default: results/NAME.starts.h5; beside an archive)"),
 )
@@ -145,7 +145,7 @@ def multistart(options: argparse.Namespace) -> int:
         start = f"--start {optima[0].best.start}{which}"
         lines.append(f"  colloc multistart {path} {start}   makes a result of the best")
     if others := len(archive.outcomes) - len(outcomes):
-        line_ = f"  starts in the file besides: {others}"
+        line_ = f"  other starts in the file: {others}"
         solved = {name: o.value for name, o in archive.outcomes.items() if o.status == SOLVED}
         if solved:
             best = max(solved, key=lambda name: solved[name])
@@ -334,7 +334,7 @@ def steer(options: argparse.Namespace) -> int:
         from colloc.studies.families import steer as find_gaits
 
         def report(turn: float, point: Solution) -> None:
-            say(f"{math.degrees(turn):+.4g} degrees a period", point)
+            say(f"{math.degrees(turn):+.4g} degrees per cycle", point)
 
         say("the straight gait")
         turns, spot = ([*map(math.radians, each)] for each in (options.turn, options.spot))

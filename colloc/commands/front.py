@@ -100,7 +100,7 @@ def _front_table(
         )
         lines.append(f"  {k:3d} {''.join(f'{x:16.7g}' for x in numbers)}  {point.status}")
         if k in gaps:
-            lines.append(f"       nothing found between: {gaps[k].why}")
+            lines.append(f"       no gait found between: {gaps[k].why}")
     lines += [f"  {front.narrow}"] * bool(front.narrow)
     content = io.StringIO(newline="")
     writer = csv.DictWriter(content, rows[0])

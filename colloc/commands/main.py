@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 SUBCOMMANDS = {
     "init": ("solve", "write a commented problem file for a chain of links, to change and solve"),
     "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
-    "multistart": ("families", "solve from many random starts; distinct optima, how often found"),
+    "multistart": ("families", "solve from many random starts; list the distinct optima"),
     "sweep": ("families", "solve a study, a grid of problems, over processes"),
     "pareto": ("families", "trade-off (Pareto front) of two objectives, as certified gaits"),
     "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),
@@ -226,10 +226,10 @@ ROBOT = (
 )
 PERIOD = option(float, "--period S", "seconds per cycle")
 MAX_SPEED = option(
-    float, "--max-speed V", "limit of the joints [rad/s], one or one each", nargs="+"
+    float, "--max-speed V", "limit of the joints [rad/s]: one for all or one each", nargs="+"
 )
 MAX_TORQUE = option(
-    float, "--max-torque M", "limit of the joints [N m], one or one each", nargs="+"
+    float, "--max-torque M", "limit of the joints [N m]: one for all or one each", nargs="+"
 )
 
 

@@ -72,7 +72,7 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
     before, after = ({x.name: x.threshold for x in each.checks} for each in (recorded, now))
     if before.keys() != after.keys():
         missing = ", ".join(sorted(before.keys() ^ after.keys()))
-        return f"the file's certificate has not the checks of a new one: {missing}."
+        return f"the file's certificate lacks the checks {missing}."
     for name, limit in before.items():  # the replay error has the tolerance that is requested
         if name != "replay error" and limit != after[name]:
             allowed = f"and {after[name]:.0e} is allowed"
@@ -114,11 +114,11 @@ def verify(options: argparse.Namespace) -> int:
     lines = [
         f"{problem.name}: {'certified' if good else 'NOT CERTIFIED'}",
         f"  {problem.objective.label:<15s} {now.value:.8f} +- {now.value_error:.0e} by replay "
-        f"({now.instants} instants)",
+        f"({now.instants} time points)",
     ]
     if recorded.replayed:
         value = f"{recorded.value:.8f} +- {recorded.value_error:.0e}"
-        lines.append(f"  in the file     {value} ({recorded.instants} instants)")
+        lines.append(f"  in the file     {value} ({recorded.instants} time points)")
     if not options.quiet:
         lines += [f"  {check.line()}" for check in now.checks]
     if complaint:
@@ -306,7 +306,7 @@ def robot(options: argparse.Namespace) -> int:
 
 @cli.command(
     cli.RESULT,
-    cli.flag("--again", "also re-optimise there, and compare with this gait"),
+    cli.flag("--again", "also re-optimise for each change, and compare"),
 )
 def sensitivity(options: argparse.Namespace) -> int:
     solution = load(options.result)

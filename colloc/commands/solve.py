@@ -178,7 +178,7 @@ def init(options: argparse.Namespace) -> int:
     if model:
         notes = [x for x in model.notes if options.mu is None or "--mu" not in x]
         if not (wheels or feet):
-            notes.append("no wheels or feet are known: links lie on the floor (--feet, --wheels)")
+            notes.append("no wheels or feet found: links lie on the floor (--feet, --wheels)")
         facts |= {"joints": model.joints, "notes": notes}
         lines += [f"  {x}" for x in (f"angles in {source}: {model.joints}", *notes)]
     cli.tell(options, facts, lines)
@@ -292,7 +292,7 @@ def bound_facts(bound: Bound | None) -> dict | None:
 @cli.command(
     *cli.PROBLEM,
     cli.option(str, "--start FILE.h5", "start from the gait of an earlier result"),
-    cli.flag("--fresh", "do not go on from an interrupted run"),
+    cli.flag("--fresh", "do not resume an interrupted run"),
     cli.output("folder, or .h5 file (default: results/NAME.h5)"),
     cli.option(
         int,
@@ -303,7 +303,7 @@ def bound_facts(bound: Bound | None) -> dict | None:
     cli.option(
         float,
         "--seconds S",
-        "wall time; then the best gait so far is the answer",
+        "stop after this time with the best gait so far",
         math.inf,
         least=0,
     ),
@@ -407,7 +407,7 @@ _OF_A_GAIT = (
     cli.option(str, "gait GAIT.csv", "times and joint angles"),
     cli.option(float, "--period T", "in the file's unit of time (default: from repetition)"),
     cli.option(int, "--harmonics N", "of the fit (default: as many as the samples determine)"),
-    cli.flag("--degrees", "angles are degrees where names do not say what they are"),
+    cli.flag("--degrees", "angles without a unit are in degrees"),
 )
 
 
@@ -431,7 +431,7 @@ def evaluate(options: argparse.Namespace) -> int:
 @cli.command(
     *_OF_A_GAIT,
     cli.option(float, "--length M", "length of the robot [m] (default: the problem's)", least=0),
-    cli.option(float, "--mu-forward MU", "the forward coefficient, measured otherwise", least=0),
+    cli.option(float, "--mu-forward MU", "the forward coefficient, measured separately", least=0),
 )
 def identify(options: argparse.Namespace) -> int:
     from colloc.search.identify import identify as identify_friction

@@ -332,7 +332,7 @@ class Inertial(QuasiStatic):
 
     followed = True
     lack = (
-        "no period with inertia was found that repeats itself; give another guess, or a "
+        "no motion with inertia was found in which all cycles are alike; try another guess or a "
         "smaller froude"
     )
 

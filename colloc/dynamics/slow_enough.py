@@ -39,7 +39,7 @@ def efficiency_at(
     froude: float = 0.0,
     near: np.ndarray | None = None,
 ) -> tuple[float, np.ndarray | None]:
-    """Efficiency of a gait in the motion in which all periods are alike, and its states at the
+    """Efficiency of a gait in the motion in which all cycles are alike, and its states at the
     points of a mesh whose neighbours share no stage, sought near others or those of the slow
     motion. The distance is the chord of the arc, which does not depend on the phase at which a
     period begins (`colloc.gaits.period`). `NotConvergedError` if no motion is found."""
@@ -49,7 +49,7 @@ def efficiency_at(
     along = kind(body, friction, Regime(froude=froude)).simulate(mesh, shapes, np.empty(0), near)
     if not along.held.all():
         raise NotConvergedError(
-            f"at a Froude number of {froude:g} no motion was found in which all periods are alike."
+            f"at a Froude number of {froude:g} no motion was found in which all cycles are alike."
         )
     turn, work = point_weights(mesh) @ np.array([along.now.z[OMEGA], along.now.power]).T
     pose = CollocatedPose.on_mesh(mesh, along.now.z[OMEGA] - turn, along.now.centre)
@@ -69,8 +69,8 @@ def slow_enough(
     """The Froude number L/(g T^2) up to which inertia changes the efficiency of a gait by no more
     than the part `loss`.
 
-    A body of length L [m] that takes T [s] a period has the Froude number L / (9.81 T^2); so T must
-    be sqrt(L / (9.81 Fr)) or more. Played faster a gait may be better or worse: either is a change.
+    A body of length L [m] that takes T [s] per cycle has the Froude number L / (9.81 T^2); so T
+    must be sqrt(L / (9.81 Fr)) or more. Played faster a gait may be better or worse: either is a change.
     Paces are tried from slow to fast, each at most five times the one before in Fr, so a change
     that comes and goes between two of them is not seen.
 

@@ -107,7 +107,7 @@ class Corners(GaitFunction):
 
     @property
     def phases(self) -> np.ndarray:
-        """Phases of `vertices`, from 0 to the solved part of the period."""
+        """Phases of `vertices`, from 0 to the solved part of the cycle."""
         return fraction(self.symmetry) * self._along / self._along[-1]
 
     @cached_property
@@ -310,7 +310,7 @@ class BSpline(Splines):
     Parameters
     ----------
     knots : int
-        In a period, evenly spaced, each with a coefficient for every joint; more than the degree,
+        In a cycle, evenly spaced, each with a coefficient for every joint; more than the degree,
         64 at most, and an even number for antipodal gaits.
     degree : int
         Of the polynomials between knots, 1 to 5; its derivatives below the degree are continuous.
@@ -346,7 +346,7 @@ class BSpline(Splines):
         self._check_symmetry()
         if self.symmetry == ANTIPODAL and self.knots % 2:
             raise ProblemError(
-                f"antipodal splines repeat after half a period: give them an even number of knots, "
+                f"antipodal splines repeat after half a cycle: give them an even number of knots, "
                 f"not {self.knots}."
             )
 

@@ -38,7 +38,7 @@ class Basis(LinearClass):
     columns : sequence, or path of a CSV file
         Each column is ``(n_time,)``, a function of time that every joint has a coefficient of; or
         ``(n_joint, n_time)``, angles of all joints, with one coefficient [rad]. Samples are evenly
-        spaced over one period, the first not repeated, at least 24; or a column is a function of
+        spaced over one cycle, the first not repeated, at least 24; or a column is a function of
         phases ``(n_time,)`` that returns such values. A file has times in its first column and
         functions of time in the others.
     symmetry : {"none", "bilateral", "antipodal"}
@@ -75,7 +75,7 @@ class Basis(LinearClass):
             raise ProblemError(
                 f"the columns are too rough: a spline through their samples is off by "
                 f"{self.error:.2g} of the largest one. "
-                "Give columns that close after one period, more samples, or smoother ones."
+                "Give columns that close after one cycle, more samples, or smoother ones."
             )
 
     @property
@@ -153,7 +153,7 @@ def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
         arrays = [np.array(each(phases) if callable(each) else each, float) for each in columns]
     except (TypeError, ValueError):
         raise ProblemError(
-            "gait.columns must be a sequence of columns: samples over a period, or functions of "
+            "gait.columns must be a sequence of columns: samples over a cycle, or functions of "
             "the phase."
         ) from None
     shapes = {each.shape for each in arrays}
@@ -165,7 +165,7 @@ def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
     values = np.array(arrays)
     if values.shape[-1] < _FEWEST:
         raise ProblemError(
-            f"gait.columns have {values.shape[-1]} samples of a period: give at least {_FEWEST}."
+            f"gait.columns have {values.shape[-1]} samples of a cycle: give at least {_FEWEST}."
         )
     if not np.isfinite(values).all():
         raise ProblemError("gait.columns must be finite numbers.")
@@ -177,7 +177,7 @@ def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
 
 
 def _read(path: Path) -> list[np.ndarray]:
-    """Columns of a file after its first, even times of a period; a last line that repeats the first
+    """Columns of a file after its first, even times of a cycle; a last line that repeats the first
     is dropped."""
     _, table = csv_table(path, _FEWEST)
     steps = np.diff(table[:, 0])

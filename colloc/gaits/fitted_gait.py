@@ -27,11 +27,11 @@ _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
 _WORTH, _EXACT = 1.05, 1e-16  # factor and mean square [rad^2] by which scores count as equal
 _PHASES = np.arange(1024) / 1024  # at which a function is sampled
 _GAP = 5  # most steps from the last sample to the next period
-_DRIFT = 0.1  # drift a period that still closes, of a joint's range
+_DRIFT = 0.1  # drift per cycle that still closes, of a joint's range
 _ALIKE = 0.2
-"""Excess of the difference of a record from itself one period later over several later, at most."""
+"""Excess of the difference of a record from itself one cycle later over several later, at most."""
 _REPEATED, _DRIFTS = 10.0, 4.0
-"""Ratio of the score of several periods to that of a long one, and without a drift to with one."""
+"""Ratio of the score of several cycles to that of a long one, and without a drift to with one."""
 _ROUGH = 6  # harmonics by which the period is told
 SEVERAL = 1.1  # periods from which a record holds more than one
 _STEP = 1e-5  # relative, of differences by the period
@@ -41,7 +41,7 @@ COVERED = 0.97725  # standard normal distribution at two standard deviations
 _TINY = 1e-300
 
 Given = Fourier | np.ndarray | str | os.PathLike[str] | Callable[[np.ndarray], np.ndarray]
-"""A series; angles ``(n_joint, n_time)`` at equal steps of a period, or labelled by xarray; a CSV
+"""A series; angles ``(n_joint, n_time)`` at equal steps of a cycle, or labelled by xarray; a CSV
 file; or a function of phases ``(n_time,)``."""
 
 
@@ -60,14 +60,14 @@ class FittedGait:
     rms: float = 0.0  # root-mean-square residual of the angles [rad]
     largest: float = 0.0  # and the largest
     samples: int = 0  # 0 for a series, which is taken as it is
-    drift: float = 0.0  # largest drift of a joint a period [rad], taken out
+    drift: float = 0.0  # largest drift of a joint per cycle [rad], taken out
     degrees: bool = False  # whether angles were given in degrees
     periods: float = 1.0  # that the samples hold
     period: float = 1.0  # in the unit of time of a file
     uncertainty: Uncertainty | None = None  # None for a series
     record: Record | None = None  # of a file
-    path: np.ndarray | None = None  # of centre and tail over a period, (2, 2, n_time)
-    went: float = 0.0  # distance of the centre a period, mean over the record [body lengths]
+    path: np.ndarray | None = None  # of centre and tail over a cycle, (2, 2, n_time)
+    went: float = 0.0  # distance of the centre per cycle, mean over the record [body lengths]
 
     @property
     def centre(self) -> int:
@@ -82,12 +82,12 @@ class FittedGait:
         text = f"{self.record.describe(used)}; " if self.record else ""
         if self.centre:
             text += f"all joints move about {self.centre}°, which servos may count from; "
-        text += f"{self.gait.n_harmonic} harmonic{plural} through {self.samples} samples"
+        text += f"{self.gait.n_harmonic} harmonic{plural} fitted to {self.samples} samples"
         if self.periods > SEVERAL:
-            text += f" of {self.periods:.3g} periods of {self.period:.4g}"
+            text += f" of {self.periods:.3g} cycles of {self.period:.4g}"
         if self.drift:
-            text += f", a drift of {_format(self.drift, self.degrees)} a period taken out"
-        return f"{text}: off by {rms} r.m.s., {largest} at most"
+            text += f", a drift of {_format(self.drift, self.degrees)} per cycle taken out"
+        return f"{text}: residual {rms} r.m.s., {largest} at most"
 
 
 def _format(angle: float, degrees: bool, digits: str = ".3g") -> str:
@@ -145,7 +145,7 @@ def fitted_gait(
 
 
 def _with_path(fitted: FittedGait, samples: _Samples, path: np.ndarray) -> FittedGait:
-    """A gait with what the markers went in its period; a step beyond the record, where a period
+    """A gait with what the markers went in its cycle; a step beyond the record, where a cycle
     ends without its last sample, they go straight on."""
     end, step = samples.time[-1], samples.step
     time = np.append(samples.time, end + 2 * step)
@@ -251,7 +251,7 @@ class _Samples(NamedTuple):
         end, step = self.time[-1], self.step
 
         def up_to(most: int, period: float, chosen: int, drifts: bool = False) -> list[_Fit]:
-            many = min(self.time.size, int(period / step))  # samples of a period
+            many = min(self.time.size, int(period / step))  # samples of a cycle
             most = harmonics or min(most, max(1, (many - 1) // _SAMPLES_A_HARMONIC))
             return self.scores(_Fit(most, drifts, np.inf, period), harmonics or 1, chosen)
 
@@ -314,13 +314,13 @@ class _Samples(NamedTuple):
         """The gait without the drift of its record. `ProblemError` if that is not small."""
         table, _ = self.least_squares(fit)
         gait = Fourier.from_table(table[:, int(fit.drifts) :])
-        drift = np.abs(table[:, 0]) * fit.drifts  # a period
+        drift = np.abs(table[:, 0]) * fit.drifts  # per cycle
         ranges = np.ptp(gait.angles(_PHASES), axis=1)
         if drift.max() > _DRIFT * ranges.max():
             joint = int(drift.argmax())
             off, moves = (_format(each[joint], self.degrees) for each in (drift, ranges))
             raise ProblemError(
-                f"{self.name} does not close: after a period joint {joint + 1} is off by {off}, "
+                f"{self.name} does not close: after a cycle joint {joint + 1} is off by {off}, "
                 f"and it moves through {moves}. Give one whole period, or say how long it is "
                 f"(period=, --period)."
             )

@@ -79,7 +79,7 @@ class GaitFunction:
         if self.log_period is not None:
             period = np.exp(self.log_period)
             lines.append(
-                f"a period takes {period:.5g} sqrt(L/g), {period / np.sqrt(GRAVITY):.3g} s for "
+                f"a cycle takes {period:.5g} sqrt(L/g), {period / np.sqrt(GRAVITY):.3g} s for "
                 f"a body of 1 m: Froude number {period**-2:.4g}"
             )
         if self.theta is not None:

@@ -163,7 +163,7 @@ class LinearClass:
 
     @property
     def fraction(self) -> float:
-        """Part of the period that is solved; symmetry gives the rest."""
+        """Part of the cycle that is solved; symmetry gives the rest."""
         return fraction(self.symmetry)
 
     # meshes
@@ -187,7 +187,7 @@ class LinearClass:
         return max(2, -(-4 * self.harmonics // per_interval)), f"{self.harmonics} harmonics"
 
     def edges(self, n: int) -> np.ndarray:
-        """Edges of a mesh of about n intervals on the solved part of the period."""
+        """Edges of a mesh of about n intervals on the solved part of the cycle."""
         ends = self.pieces
         shares = np.round(n * np.diff(ends) / ends[-1]).astype(int)
         counts = np.maximum(2 if self.relative_delta else 1, shares)
@@ -329,7 +329,7 @@ def _symmetric_tables(kind: LinearClass, n_joint: int) -> np.ndarray:
     if kind.symmetry == BILATERAL:
         how, image = "run backwards, seen from the other end,", np.roll(angles[::-1, ::-1], 1, 1)
     else:
-        how, image = "half a period later, negated,", np.roll(angles, angles.shape[1] // 2, axis=1)
+        how, image = "half a cycle later, negated,", np.roll(angles, angles.shape[1] // 2, axis=1)
     image = -image.reshape(matrix.shape)
     turned = np.linalg.lstsq(matrix, image, rcond=None)[0]
     if np.abs(matrix @ turned - image).max() > _CLOSED * largest:

@@ -1,4 +1,4 @@
-"""Objectives: expressions of the quantities of a period (`colloc.numerics.expression`)."""
+"""Objectives: expressions of the quantities of a cycle (`colloc.numerics.expression`)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from colloc.system.arguments import is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
 
 QUANTITIES = {
-    "distance": "displacement of the centre of mass over a period, the chord of the arc if a turn "
+    "distance": "displacement of the centre of mass over a cycle, the chord of the arc if a turn "
     "is asked for [body lengths]",
-    "work": "work against friction over a period",
-    "rotation": "net rotation over a period, counter-clockwise [rad]",
+    "work": "work against friction over a cycle",
+    "rotation": "net rotation over a cycle, counter-clockwise [rad]",
     **{name: quantity.meaning for name, quantity in INTEGRALS.items()},
-    "period": "time that a period takes, of a body with inertia [sqrt(length / gravity)]",
+    "period": "time that a cycle takes, of a body with inertia [sqrt(length / gravity)]",
 }
 """Variables of every expression."""
 _SAMPLES = (
@@ -35,7 +35,7 @@ _FLATTEST = 1e-30  # least slope of an objective; its inverse is the largest
 @named_arguments
 @dataclass(frozen=True)
 class Objective:
-    """A function of the quantities of a period.
+    """A function of the quantities of a cycle.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Objective:
             raise ProblemError(f"objective: {error} {known}") from None
         if not stated.names & {*self._names}:
             raise ProblemError(
-                f"the objective {stated.text!r} speaks of nothing that a gait does; it may of "
+                f"the objective {stated.text!r} uses no quantity of a gait; it may use "
                 f"{', '.join(self._names)}."
             )
         names = {expression: name for name, expression in NAMED.items()}
@@ -96,9 +96,9 @@ class Objective:
             values, partials = [np.nan], [{}]
         steepest = [max(map(abs, each.values()), default=np.nan) for each in partials]
         if not all(isinstance(value, float) and np.isfinite(value) for value in values):
-            wrong = f"has no value for a usual gait: {self._samples[0]}"
+            wrong = f"has no finite value for a typical gait: {self._samples[0]}"
         elif not all(_FLATTEST < slope < 1 / _FLATTEST for slope in steepest):
-            wrong = "does not tell usual gaits apart: it is too flat or too steep"
+            wrong = "does not distinguish typical gaits: it is too flat or too steep"
         elif min(each.get("distance", 0.0) for each in partials) < 0:
             wrong = (
                 "falls with the distance; a body counts its distance in the direction in which it "
@@ -109,7 +109,7 @@ class Objective:
         raise ProblemError(f"the objective {self.expression!r} {wrong}.")
 
     def __call__(self, period: Mapping[str, Any]) -> Any:
-        """The value for quantities of a period: floats or CasADi's symbols."""
+        """The value for quantities of a cycle: floats or CasADi's symbols."""
         value = formula(self.expression, self._names)(period)
         return float(value) if isinstance(value, np.ndarray) else value
 
@@ -141,7 +141,7 @@ class Objective:
     def degree(self) -> float | None:
         """Power of the friction coefficients that the value is proportional to, if to any."""
         degrees = {"work": 1.0} | {each.name: each.friction_degree for each in self.integrals}
-        # a period depends on the ratio of weight to friction
+        # a cycle depends on the ratio of weight to friction
         if "period" in self.uses or None in degrees.values():
             return None
         powers = []
@@ -156,7 +156,7 @@ class Objective:
     def gradient(
         self, period: Mapping[str, float], slopes: Mapping[str, np.ndarray]
     ) -> np.ndarray | float:
-        """Gradient of the value, from the quantities of a period and their gradients."""
+        """Gradient of the value, from the quantities of a cycle and their gradients."""
         return sum(slope * slopes[name] for name, slope in self.partials(period).items())
 
     def partials(self, period: Mapping[str, float]) -> dict[str, float]:
@@ -245,7 +245,7 @@ def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:
         isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in pairs
     ):
         raise ProblemError(
-            f"at_least names what must be reached with its value, as {{'distance': 0.3}}, not "
+            f"at_least must map objectives to required values, as {{'distance': 0.3}}, not "
             f"{shown(stated)}."
         )
     values: dict[str, tuple[Objective, float]] = {}

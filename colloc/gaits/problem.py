@@ -87,7 +87,7 @@ class Problem:
         length of a path over 2 pi. Where speeds sink to delta, regularised friction is viscous and
         efficiency meaningless.
     intervals : int
-        Intervals of the first mesh, on the solved part of the period.
+        Intervals of the first mesh, on the solved part of the cycle.
     scheme : str
         Collocation scheme, see `colloc.numerics.schemes.scheme`.
     formulation : {"full", "implicit velocity"}
@@ -101,10 +101,10 @@ class Problem:
         What is maximised: "efficiency", "speed", "turning", "driven efficiency", or an expression
         of distance, work, rotation, length, driven_work and, with inertia, period.
     rotation : float or None
-        Net rotation over a period [rad], counter-clockwise; None leaves it free. Other values than
+        Net rotation over a cycle [rad], counter-clockwise; None leaves it free. Other values than
         0 need a class without symmetry.
     at_least : mapping or pairs of (Objective or str, float)
-        Values of a period that must be reached, as ``{"distance": 0.3}``.
+        Values of a cycle that must be reached, as ``{"distance": 0.3}``.
     torque_limit, power_limit : float or sequence of float, optional
         Of all motors or of each: magnitude of the moment [weight x body length], power delivered
         [weight x body length / period]. With a power limit the pace matters.
@@ -131,7 +131,7 @@ class Problem:
         The robot in SI units. Its pace, motors and electronics say `froude`, `speed_limit`,
         `torque_limit` and, where none is stated, the objective: least energy per metre.
     least_distance : float, optional
-        Distance that a gait must go in a period [body lengths], or half of what the farthest one
+        Distance that a gait must go in a cycle [body lengths], or half of what the farthest one
         goes, if that is less than this.
     shrinking : bool
         Whether a gait may be the answer that shrank until nobody sees it move. By default the best
@@ -312,7 +312,7 @@ class Problem:
     def _check_aims(self) -> None:
         if self.uses("period") and not self.froude:
             raise ProblemError(
-                "what is asked for speaks of the period: state the pace, froude=0.05 or "
+                "the objective or a requirement uses the period: state the pace, froude=0.05 or "
                 "froude=Free(0.001, 1)."
             )
         least = self.least_distance
@@ -322,7 +322,7 @@ class Problem:
             raise ProblemError(f"rotation must be a finite number or None, not {self.rotation!r}.")
         if self.rotation == 0 and self.uses("rotation"):
             raise ProblemError(
-                "the objective speaks of the rotation, which is 0 unless rotation says otherwise "
+                "the objective uses the rotation, which is 0 unless rotation says otherwise "
                 "(None: free)."
             )
         if self.rotation != 0 and self.gait.symmetry != NONE:
@@ -456,7 +456,7 @@ class Problem:
 
     @property
     def fraction(self) -> float:
-        """Part of the period that is solved; symmetry gives the rest."""
+        """Part of the cycle that is solved; symmetry gives the rest."""
         return fraction(self.regime.motion_symmetry(self.gait.symmetry))
 
     @property

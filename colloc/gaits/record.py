@@ -59,7 +59,7 @@ class Record(NamedTuple):
         """What was read, and what was left out, unless it was of use elsewhere."""
         left = [column.name for column, _ in self.others if column not in used]
         more = f" and {len(left) - 3} more" if len(left) > 3 else ""
-        return f"{self.taken}{'; left out: ' * bool(left)}{', '.join(left[:3])}{more}"
+        return f"{self.taken}{'; ignored: ' * bool(left)}{', '.join(left[:3])}{more}"
 
 
 class Column(NamedTuple):
@@ -113,7 +113,7 @@ def read_record(
     rows, notes = _rows(path, table, time, clock, joints)
     if re.search(r"^#\s*ramp_s:", table.preamble, re.M):
         rows = rows[time[rows] >= 0]
-        notes.append("the way into the gait, before time 0, left out")
+        notes.append("lead-in before time 0 ignored")
     time = time[rows]
     if (falls := np.flatnonzero(np.diff(time) < 0)).size:
         raise ProblemError(

@@ -174,7 +174,7 @@ class Regime:
                 )
             if gaits.relative_delta and gaits.symmetry != NONE:
                 raise ProblemError(
-                    f"on a slope no part of a period follows from another: take {name}(..., "
+                    f"on a slope no part of a cycle follows from another: take {name}(..., "
                     f"symmetry='none'), which has gaits of symmetry {gaits.symmetry}, too."
                 )
         if self.free and not (free_joints and gaits.linear and not gaits.relative_delta):
@@ -186,7 +186,7 @@ class Regime:
             self._check_inertia(problem)
         if self.slides and problem.rotation != 0:
             raise ProblemError(
-                "on a slope a body that a period turns has no gait that repeats, as its weight "
+                "on a slope a body that a cycle turns has no gait that repeats, as its weight "
                 "then pulls from another side: leave rotation at 0, and out of what is asked for."
             )
         if problem.formulation != FULL:
@@ -217,7 +217,7 @@ class Regime:
             )
         if not gaits.relative_delta and gaits.symmetry not in (NONE, ANTIPODAL):
             raise ProblemError(
-                f"gaits of symmetry {gaits.symmetry} run backwards in half of their period, as "
+                f"gaits of symmetry {gaits.symmetry} run backwards in half of each cycle, as "
                 f"nothing with inertia does: take symmetry {ANTIPODAL!r} or {NONE!r}."
             )
         if not any(each.needs_forces for each in (problem.path_limits, *problem.integrals)):

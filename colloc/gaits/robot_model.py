@@ -92,7 +92,7 @@ def read_model(path: Path) -> Model:
     except (ProblemError, ValueError) as error:
         raise ProblemError(f"{path}: {error}") from None
     unread = [what for what, tags in _UNREAD.items() if _first(root, tags)]
-    return model._replace(notes=model.notes + [f"not taken: {', '.join(unread)}"] * bool(unread))
+    return model._replace(notes=model.notes + [f"not used: {', '.join(unread)}"] * bool(unread))
 
 
 def _first(root: Element, tags: str) -> str:

@@ -108,7 +108,7 @@ class BalanceSolution:
         if not self.converged.all():
             bad = np.flatnonzero(~self.converged)
             raise NotConvergedError(
-                f"the balance did not converge at {bad.size} of {self.converged.size} instants "
+                f"the balance did not converge at {bad.size} of {self.converged.size} time points "
                 f"(first: {bad[:5].tolist()}, worst residual {self.residual[bad].max():.1e})."
             )
         return self

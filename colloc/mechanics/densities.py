@@ -1,4 +1,4 @@
-"""Formulas of a time point: what a period integrates besides distance and work, and what limits
+"""Formulas of a time point: what a cycle integrates besides distance and work, and what limits
 bound.
 
 A formula is text, so that files can hold it, and is evaluated with NumPy where a motion is replayed
@@ -29,7 +29,7 @@ VARIABLES = {
     "speed": "of every joint at a free pace [rad per sqrt(length / gravity)]",
     "moment": "that the actuator of every joint exerts [weight x body length]",
     "power": "that it delivers, moment times rate",
-    "idle": "power at an instant below which regularised friction does not tell who drives whom: "
+    "idle": "power below which regularised friction does not tell who drives whom: "
     "friction at the speed delta",
 }
 SUMMED = (*FUNCTIONS, "sum")
@@ -208,7 +208,7 @@ class _OfInstants:
         if np.shape(value) not in [(n, 5) for n in rows]:
             raise ProblemError(f"{what}: '{text}' {instead}.")
         if not np.isfinite(value).all():
-            raise ProblemError(f"{what}: '{text}' has no finite value at a usual instant.")
+            raise ProblemError(f"{what}: '{text}' is not finite for typical values.")
 
     def fields(self) -> dict[str, Any]:
         """As plain numbers and text (JSON)."""
@@ -219,7 +219,7 @@ class _OfInstants:
 @named_arguments
 @dataclass(frozen=True)
 class Quantity(_OfInstants):
-    """An integral over a period, for objectives to speak of.
+    """An integral over a cycle, for objectives to speak of.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def quantities_of(asked: Any) -> tuple[Quantity, ...]:
 @named_arguments
 @dataclass(frozen=True)
 class PathLimit(_OfInstants):
-    """An upper bound on a function of a time point, throughout a period.
+    """An upper bound on a function of a time point, throughout a cycle.
 
     Parameters
     ----------
@@ -329,7 +329,7 @@ class PathLimit(_OfInstants):
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
             raise ProblemError(f"a path limit needs a name, not {self.name!r}.")
-        instead = "has no value at an instant: let it speak of joints"
+        instead = "is not defined at a time point: use quantities of joints"
         self._check(f"the limit {self.name}", (1, 3), instead)
         each = tuple(np.ravel(np.asarray(self.most, dtype=object)).tolist())
         if not each or not all(is_number(a) and a > 0 for a in each):

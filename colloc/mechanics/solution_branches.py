@@ -196,7 +196,7 @@ def followed_motion(
         lost = int((found.number == 0).sum())
         raise NotConvergedError(
             f"no velocity that balances the body was found at {lost} of {found.number.size} "
-            f"instants."
+            f"time points."
         )
     z, several = found.z[0].copy(), np.flatnonzero(found.number > 1)
     apart = np.zeros((3 + len(quantities), z.shape[1]))

@@ -161,7 +161,7 @@ def _check_node(
         case ast.BinOp(op=ast.Pow()) if _has_name(node.right):
             raise ProblemError(f"'{text}' has an exponent that is no number.")
         case ast.Name() if node.id not in known:
-            raise ProblemError(f"'{text}' speaks of {node.id}; it may use {', '.join(known)}.")
+            raise ProblemError(f"'{text}' uses {node.id}; it may use {', '.join(known)}.")
         case ast.Constant():
             allowed = type(node.value) in (int, float)
         case ast.Compare():

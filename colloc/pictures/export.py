@@ -71,7 +71,7 @@ _UNITS |= {"deg": "angles", "deg_per_s": "speeds"}
 _UNKNOWN = ProblemError, NotConvergedError
 _THIN = 0.02  # width and height of links that have none [body lengths]
 _POINTS = 16  # on which a pad or a link stands
-_STEPS, _LONGEST = 8000, 1e-3  # time steps of a period, and the longest one [s]
+_STEPS, _LONGEST = 8000, 1e-3  # time steps of a cycle, and the longest one [s]
 _AXIS, _MASS = 1e-4, 1e-6  # half length of a capsule, and mass of a foot, in those of the body
 _STIFF = 5000.0  # gain of the position servos per rad, over the largest torque of the gait
 _SPIN = 1e-3  # moment of inertia of a wheel, in load times radius squared
@@ -192,8 +192,8 @@ def write_export(
         holds = "in a period of 1"
         if froude:
             size = froude * pressing(solution, gravity) * trajectory.period**2
-            holds = f"at the Froude number {froude:.4g}: of a robot of {size:.3g} m in this period"
-        facts["pace"] = f"the gait's own, as {paced_by}; distance and work are those {holds}"
+            holds = f"at Froude number {froude:.4g}: a robot of {size:.3g} m at this period"
+        facts["pace"] = f"the gait's own, as {paced_by}; distance and work hold {holds}"
         facts |= {"froude_number": froude} if froude else {}
 
     def into_gait(rate: float, trajectory: Trajectory = trajectory) -> Approach:
@@ -237,7 +237,7 @@ def write_export(
             row.append(row[2] * row[1])
     if periods * trajectory.time.size > MOST_SAMPLES:
         raise ProblemError(
-            f"{periods} periods have too many samples: a file holds at most {MOST_SAMPLES}."
+            f"{periods} cycles have too many samples: a file holds at most {MOST_SAMPLES}."
         )
     time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
     table = np.tile(rows[-1], periods)  # (unit, joint, time)

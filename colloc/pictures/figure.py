@@ -139,7 +139,7 @@ def plot_solution(solution: Solution, ax: Axes | None = None, panel: str = "gait
         f"{'' if solved else f'   —   {solution.status.upper()}'}\n"
         f"class: {';  '.join([problem.gait.describe(), *more])}"
     )
-    strip = "one period: phase, and below it the displacement of the centre (disc: head)"
+    strip = "one cycle: phase, and below it the displacement of the centre (disc: head)"
     if si:
         strip = "one cycle: time [s], and below it the displacement of the centre [cm] (disc: head)"
     work = si.get("friction_work_per_cycle_J", solution.measured.work)
@@ -237,7 +237,7 @@ class BodyMarks:
 
 
 def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
-    """The body at equal steps of a period, with the phase and the displacement of its centre."""
+    """The body at equal steps of a cycle, with the phase and the displacement of its centre."""
     body, motion = solution.problem.body, solution.sample(np.linspace(0.0, 1.0, count))
     ends, feet, held = lab_outline(body, motion), lab_feet(body, motion), solution.holding(motion)
     units = drawn_units(solution)
@@ -272,7 +272,7 @@ def draw_filmstrip(axes: Axes, solution: Solution, count: int = 11) -> None:
 
 def draw_lab(axes: Axes, solution: Solution) -> None:
     """Paths of tail, head and centre of mass, over the periods that separate the first body from
-    the last one; of one period with one body if these are too many."""
+    the last one; of one cycle with one body if these are too many."""
     body, ends = solution.problem.body, solution.sample(np.array([0.0, 1.0]))
     step = ends.centre[:, 1] - ends.centre[:, 0]
     needed = 1.05 * float(np.ptp(step @ lab_outline(body, ends)[:, :, 0]))
@@ -292,7 +292,7 @@ def draw_lab(axes: Axes, solution: Solution) -> None:
         marks.place((outline[..., k], fine.centre[:, k], feet[..., k]), held[:, k])
     axes.autoscale_view()
     axes.set_aspect("equal", "datalim")
-    counted = f"{periods} period{'s' if periods > 1 else ''}"
+    counted = f"{periods} cycle{'s' if periods > 1 else ''}"
     units = drawn_units(solution)
     axes.set(xlabel=f"x  [{units.of_length}],  {counted}", ylabel=f"y  [{units.of_length}]")
     _label_in(units.length, axes.xaxis, axes.yaxis)
@@ -469,7 +469,7 @@ def draw_front(axes: Axes, front: ParetoFront) -> None:
     whole = np.insert(values, after, np.nan, axis=0)
     axes.plot(whole[:, 1], whole[:, 0], "-", color=BLUE, lw=0.8, zorder=1)
     for k in after:
-        label = "nothing found between" if k == after[0] else None
+        label = "no gait found between" if k == after[0] else None
         ends = values[k - 1 : k + 1].T[::-1]
         axes.plot(*ends, ":", color=VERMILION, lw=0.8, zorder=1, label=label)
     axes.scatter(values[:, 1], values[:, 0], c=snapshot_colours(len(front.points)), s=28, zorder=2)
@@ -497,7 +497,7 @@ def _draw_cost(axes: Axes, family: Steering) -> None:
     if (spot := family.on_the_spot) is not None:
         label = "on the spot, with least work"
         axes.plot(np.degrees(spot.turns), spot.efficiency, "s", color=VERMILION, ms=4, label=label)
-    axes.set(xlabel="turn of a period  [degrees, + left]", ylabel="efficiency, chord / W")
+    axes.set(xlabel="turn of a cycle  [degrees, + left]", ylabel="efficiency, chord / W")
     axes.set_ylim(0, 1.1 * values.max())
     axes.set_title(family.problem.name)
     if axes.get_legend_handles_labels()[0]:
@@ -514,14 +514,14 @@ def _draw_tracks(axes: Axes, family: Steering) -> None:
         track = point.motion.sample(t).centre  # all arcs set out along +x
         axes.plot(*track, color=colour, lw=1.0)
         axes.plot(*track[:, ::_DOTS], mark, color=colour, ms=3)
-    what = f"x  [body lengths],  {_TRACK} periods"
+    what = f"x  [body lengths],  {_TRACK} cycles"
     axes.set(xlabel=what, ylabel="y  [body lengths]", aspect="equal")
 
 
 def robot_panels(robot: RobotSheet) -> dict[str, Panel]:
     def panel(what: str, unit: str) -> Panel:
         t, rows = robot.columns["t"].values, robot.columns[f"joint_{what}s"].values
-        labels = "time  [s],  one period", f"{what}  [{unit}]"
+        labels = "time  [s],  one cycle", f"{what}  [{unit}]"
         return Panel(COLUMN, 2.2, lambda axes: _draw_series(axes, t, rows, "joint", *labels))
 
     return {what: panel(what, unit) for what, unit in _QUANTITIES.items()}

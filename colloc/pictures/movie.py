@@ -40,7 +40,7 @@ _COLOURS, _MOST_PICTURES = 64, 5000
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Positions in the lab of a period from phase 0 to 1, or of several from rest."""
+    """Positions in the lab of a cycle from phase 0 to 1, or of several from rest."""
 
     motion: SampledMotion
     ends: np.ndarray  # (2, n_point, n_time), outline, tail first
@@ -70,7 +70,7 @@ def frames(
     periods: int = 3,
     motion: SampledMotion | None = None,
 ) -> Frames:
-    """Frames at `count` phases of a period, both ends included, or of another motion of the gait,
+    """Frames at `count` phases of a cycle, both ends included, or of another motion of the gait,
     with about so many arrows of friction."""
     problem, body = solution.problem, solution.problem.body
     motion = motion or solution.sample(np.linspace(0.0, 1.0, count))
@@ -148,7 +148,7 @@ def pictures(
     beside: Solution | None = None,
     names: Sequence[str] = (),
 ) -> Iterator[np.ndarray]:
-    """Images ``(height, width, 3)`` of bytes, `count` a period, of an even width [pixels].
+    """Images ``(height, width, 3)`` of bytes, `count` a cycle, of an even width [pixels].
 
     A gait `beside` is shown at the same scale and time: body lengths and periods, or metres and
     seconds where both problems state a robot, `count` pictures in the longer period.
@@ -196,9 +196,9 @@ def pictures(
                     value = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s   (squares of 10 cm)"
                 figure.text(left, 0.93, title + value, fontsize=11 * small, weight="bold")
                 continue
-            way = f"{each.distance:.4f} body lengths a period"
+            way = f"{each.distance:.4f} body lengths per cycle"
             if real:
-                way = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s, {times[k]:.3g} s a period"
+                way = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s, {times[k]:.3g} s per cycle"
             figure.text(
                 left, 0.085 * width / height, title, fontsize=11 * small, weight="bold", va="top"
             )
@@ -318,8 +318,7 @@ def write_movie(
     count = round(seconds * fps) if np.isfinite(seconds * fps) else 0
     if periods < 1 or count < 2 or periods * count > _MOST_PICTURES:
         raise ProblemError(
-            f"{periods} periods of {count:g} pictures cannot be drawn; change periods, seconds "
-            f"or fps."
+            f"{periods} cycles of {count:g} frames cannot be drawn; change periods, seconds or fps."
         )
     if not 200 <= width <= 4000:
         raise ProblemError(f"width must lie between 200 and 4000, not {width}.")
@@ -334,7 +333,7 @@ def write_movie(
         how: Any = {"arrows": arrows, "width": even, "from_rest": from_rest}
         drawn = pictures(solution, count, periods, **how, beside=beside, names=names)
         for k, picture in enumerate(drawn, 1):
-            line.say(f"picture {k} of {total}", (time.monotonic() - begin) / k * (total - k))
+            line.say(f"frame {k} of {total}", (time.monotonic() - begin) / k * (total - k))
             yield picture
 
     with StatusLine(enabled=not quiet) as line:

@@ -228,7 +228,7 @@ def _front_section(front: ParetoFront) -> dict[str, Any]:
         swings = ", ".join(f"{math.degrees(swing):.0f}" for swing in point.swings)
         rows.append((f"{k:02d}", *(f"{x:.5g}" for x in numbers), swings, point.status))
         if k in why:
-            rows.append((f"nothing found between: {why[k]}",))
+            rows.append((f"no gait found between: {why[k]}",))
     drawn = [_picture(Panel(COLUMN, 3.2, lambda axes: draw_front(axes, front)), "the front")]
     if front.problem.body.n_joint > 1:
         gaits = Panel(COLUMN, 3.2, lambda axes: draw_gaits(axes, points))
@@ -275,7 +275,7 @@ def _films(solutions: Mapping[str, Solution]) -> list[tuple[str, Markup]]:
 
 
 def solution_card(solution: Solution) -> str:
-    """A card with two periods from above, as points of an animated SVG, and the numbers."""
+    """A card with two cycles from above, as points of an animated SVG, and the numbers."""
     shown = _film(solution)
     return _card(solution, shown, min(_FILM / np.ptp(shown.window, axis=0)))
 

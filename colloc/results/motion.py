@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-SAMPLES = 401  # of a period in a result file, both ends included
+SAMPLES = 401  # of a cycle in a result file, both ends included
 PHASES = np.linspace(0.0, 1.0, 2001)  # the radius is accurate to 1e-7
 _PARTS, _STEP = 5, 1e-6  # parts whose speeds are drawn, and the time of a difference quotient
 _WHEEL = 0.25  # drawn length of a wheel over that of its link
@@ -76,7 +76,7 @@ def rotate(vectors: np.ndarray, theta: np.ndarray | float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """Rotation about the origin [rad], then a shift x + iy: the effect of a period of a gait."""
+    """Rotation about the origin [rad], then a shift x + iy: the effect of a cycle of a gait."""
 
     rotation: float | np.ndarray
     shift: complex | np.ndarray
@@ -97,7 +97,7 @@ class RigidMotion:
 
 
 class Arc(NamedTuple):
-    """Angle that a period turns, counter-clockwise [rad]; chord between its ends [body lengths]."""
+    """Angle that a cycle turns, counter-clockwise [rad]; chord between its ends [body lengths]."""
 
     angle: float
     chord: float
@@ -116,7 +116,7 @@ class Arc(NamedTuple):
 
 
 def arc(angle: float, centre: np.ndarray) -> Arc:
-    """Arc of a period with a turn [rad] and a path of the centre of mass ``(2, n)`` in equal
+    """Arc of a cycle with a turn [rad] and a path of the centre of mass ``(2, n)`` in equal
     steps."""
     path = centre[0] + 1j * centre[1]
     t = np.linspace(0.0, 1.0, path.size)

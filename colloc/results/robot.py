@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 SLOW_ENOUGH = 0.01  # share of the efficiency that inertia may take from a quasi-static gait
 _SAME_PACE = 0.01  # relative difference of Froude numbers that counts as none
 _ACCURACY = 1e-6  # of the momenta with inertia
-_INSTANTS, _A_SIDE = 2000, 8  # samples of a period, and of a side of a polygon, at least
+_INSTANTS, _A_SIDE = 2000, 8  # samples of a cycle, and of a side of a polygon, at least
 _UNKNOWN = ProblemError, NotConvergedError
 
 
@@ -233,7 +233,7 @@ class RobotSheet:
                 object.__setattr__(self, name, each)
                 if paced and problem.robot is None:
                     raise ProblemError(
-                        f"{name} asks for another pace, and torques depend on it, as "
+                        f"{name} needs another pace, and torques depend on it, as "
                         f"{problem.paced_by}: leave it out, or solve again for that pace."
                     )
 
@@ -267,7 +267,7 @@ class RobotSheet:
 
     @cached_property
     def columns(self) -> dict[str, Column]:
-        """Motion over a period: values, units and dimensions by name."""
+        """Motion over a cycle: values, units and dimensions by name."""
         n = max(_INSTANTS, _A_SIDE * (len(self.solution.gait.corner_phases) + 1))
         t = np.arange(n + 1) / n
         motion = (self._with_inertia or self.solution).sample(t)
@@ -286,12 +286,12 @@ class RobotSheet:
         }
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the motion over a period as an xarray Dataset in SI units."""
+        """Return the motion over a cycle as an xarray Dataset in SI units."""
         stated = {name: value for name, value in self.facts.items() if value is not None}
         return motion_dataset(self.columns, stated)
 
     def plot(self, ax: Any = None, panel: str = "torque") -> Any:
-        """Draw torque, speed and power of every joint over a period as a matplotlib Figure; with a
+        """Draw torque, speed and power of every joint over a cycle as a matplotlib Figure; with a
         matplotlib Axes `ax` the panel "torque", "speed" or "power" there, and return the Axes."""
         return higher("pictures.figure:plot_robot")(self, ax, panel)
 

@@ -147,10 +147,10 @@ class Solution:
     )
     distance = property(
         attrgetter("measured.distance"),
-        doc="Displacement over a period, by replay if there was one.",
+        doc="Displacement over a cycle, by replay if there was one.",
     )
     work = property(
-        attrgetter("measured.work"), doc="Work over a period, by replay if there was one."
+        attrgetter("measured.work"), doc="Work over a cycle, by replay if there was one."
     )
     mesh = property(attrgetter("answer.mesh"), doc="Mesh of the collocation, in phases.")
     motion = property(attrgetter("answer.motion"), doc="The motion, as collocated.")
@@ -161,13 +161,13 @@ class Solution:
 
     @property
     def rotation(self) -> float:
-        """Net rotation over a period [rad], counter-clockwise: of the replay if there was one, else
+        """Net rotation over a cycle [rad], counter-clockwise: of the replay if there was one, else
         as collocated."""
         return self.certificate.rotation if self.certificate.replayed else self.motion.rotation
 
     @property
     def arc(self) -> Arc:
-        """Angle, radius and chord of a period, whatever phase it is begun at; straight on if no
+        """Angle, radius and chord of a cycle, whatever phase it is begun at; straight on if no
         turn is asked for."""
         if self.problem.rotation is not None:
             return Arc(self.problem.rotation, self.distance)
@@ -220,7 +220,7 @@ class Solution:
         """The Froude number L/(g T^2) up to which inertia changes the efficiency by no more than
         the part `loss`.
 
-        A body of length L [m] that takes T [s] a period, on a floor whose friction is f times the
+        A body of length L [m] that takes T [s] per cycle, on a floor whose friction is f times the
         stated one, is slow enough if T is at least sqrt(L / (9.81 f Fr)). See `colloc.slow_enough`,
         which says what is raised.
         """
@@ -311,7 +311,7 @@ class Solution:
 
     @property
     def share_held(self) -> np.ndarray:
-        """Fraction of the period for which each foot sticks, ``(n_foot,)``, from the tail."""
+        """Fraction of the cycle for which each foot sticks, ``(n_foot,)``, from the tail."""
         if not foot_kinds(self.problem.body):
             return np.empty(0)
         return self.holding(self.sample(_INSTANTS)).mean(axis=1)
@@ -324,7 +324,7 @@ class Solution:
     @property
     def is_tiny(self) -> bool:
         """True if hardly anybody would see the gait: all joints of a chain move by less than 8
-        degrees, or the body by less than a fiftieth of its length a period."""
+        degrees, or the body by less than a fiftieth of its length per cycle."""
         if self.answer.program == PRESCRIBED:
             return False
         chain = isinstance(self.problem.body, Chain)
@@ -409,7 +409,7 @@ class Solution:
         return higher("search.sensitivity:sensitivity")(self, resolve)
 
     def to_xarray(self, t: np.ndarray | None = None) -> xarray.Dataset:
-        """The motion at phases `t` (one period by default) as an xarray Dataset, named as in a
+        """The motion at phases `t` (one cycle by default) as an xarray Dataset, named as in a
         result file's group motion."""
         names = ("status", "efficiency", "rotation", "turning_radius")
         about = {"name": self.problem.name} | {name: getattr(self, name) for name in names}
@@ -418,7 +418,7 @@ class Solution:
         return motion_dataset(self.columns(t), about)
 
     def to_dataframe(self, t: np.ndarray | None = None) -> pandas.DataFrame:
-        """The motion at phases `t` (one period by default) as a pandas DataFrame:
+        """The motion at phases `t` (one cycle by default) as a pandas DataFrame:
         ``joint_angles_1``, ``centre_x``, ...
 
         Of a body with modes for joints these are ``modes_1``, ``mode_rates_1``, and so in
@@ -427,7 +427,7 @@ class Solution:
         return motion_frame(self.columns(t))
 
     def columns(self, t: np.ndarray | None = None) -> dict[str, Column]:
-        """The motion at phases `t` (one period by default): name to values with their units and
+        """The motion at phases `t` (one cycle by default): name to values with their units and
         dimensions."""
         motion = self.sample(np.linspace(0.0, 1.0, SAMPLES) if t is None else t)
         return motion_columns(motion, self.power(motion), self.problem.body)

@@ -46,7 +46,7 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
     tolerance : float
         Relative error of the replayed objective; a replay that does not reach it fails its check.
     instants : int, optional
-        Instants of the first replay grid; by default many times the collocation points of a period.
+        Instants of the first replay grid; by default many times the collocation points of a cycle.
 
     Returns
     -------
@@ -83,11 +83,11 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
         ]
         value = max(-second.smallest - second.error, 0.0)
         curvature = f"smallest curvature {second.smallest:.1e}"
-        directions = f"in {second.n_free} free directions"
+        directions = f"over {second.n_free} free direction{'s' * (second.n_free != 1)}"
         if second.why_not:
             value, verdict = 0.0, second.why_not
         elif second.n_free == 0:
-            verdict = "a vertex: what binds leaves no direction free [1/rad^2]"
+            verdict = "a vertex: active constraints leave no free direction [1/rad^2]"
         elif second.smallest > second.error:
             verdict = f"an optimum: {curvature} {directions} [1/rad^2]"
         elif value > at.saddle:
@@ -165,14 +165,14 @@ def _rows(
     body, at, usual = problem.body, TOLERANCES, problem.body.defaults
     ends = path(np.array([0.0, 1.0]))[0]
     angles, rates = path(np.union1d(np.linspace(0.0, 1.0, 20001), breaks))
-    balanced = "net force and torque at all replayed instants"
+    balanced = "net force and torque at all replayed time points"
     if problem.froude:
         balanced = "change of the momenta over a cycle"
     yield "balance in replay", fine.residual, at.kkt, balanced
-    opened, meaning = float(np.abs(ends[:, 1] - ends[:, 0]).max()), "s after one period [rad]"
+    opened, meaning = float(np.abs(ends[:, 1] - ends[:, 0]).max()), "s after one cycle [rad]"
     yield "closure", opened, at.closure, f"{usual.quantity}{meaning}"
     if problem.rotation is not None:
-        which = f"beyond {problem.rotation:g} rad" if problem.rotation else "over a period"
+        which = f"beyond {problem.rotation:g} rad" if problem.rotation else "over a cycle"
         meaning = f"{which}, times the body's reach over the distance"
         turned = astray(fine, problem.rotation) / max(fine.distance, 1e-300)
         yield "net rotation", turned, at.replay_gap, meaning
@@ -207,7 +207,7 @@ def _rows(
         unexplained = float(np.copysign(max(abs(gap) - fine.ambiguity, 0.0), gap))
         meaning = "collocated over replayed efficiency, less 1"
         yield "replay gap", unexplained, at.replay_gap, meaning
-    meaning = "relative: its quadrature and balance; allowed as asked for"
+    meaning = "relative: quadrature and balance; tolerance as requested"
     yield "replay error", fine.error, tolerance, meaning
     meaning = f"work of the joints over {problem.regime.spent}, less 1"
     yield "work = dissipation", fine.actuator_work / fine.work - 1, at.work_balance, meaning
@@ -220,12 +220,12 @@ def _rows(
         meaning = f"excess over a limit, relative, in replay; closest: {nearest}"
         yield "actuators", max(float(fine.shares.max()) - 1.0, 0.0), at.replay_gap, meaning
     if problem.regime.towards is not None:
-        meaning = "of the way, off the one that was asked for [rad]"
+        meaning = "direction of travel, off the requested one [rad]"
         yield "direction", fine.across / fine.distance, at.angle, meaning
     # change of the objective by other balanced motions: where the law leaves it open no mesh
     # decides it, and as much is allowed as delta may change
     if problem.regime.slides and not problem.regime.froude:
-        meaning = "part of the period at which several motions are balanced; what they would "
+        meaning = "part of the cycle at which several motions are balanced; what they would "
         meaning += "change is not measured"
         yield "one motion", fine.several, at.nonunique_fraction, meaning
         return
@@ -238,5 +238,5 @@ def _rows(
     elif fine.several == 0:
         meaning = f"no other balanced motion was found at {fine.instants} instants"
     else:
-        meaning = f"several motions are balanced at {fine.several:.2g} of the period"
+        meaning = f"several motions are balanced at {fine.several:.2g} of the cycle"
     yield "one motion", fine.ambiguity, usual.delta_influence, f"relative; {meaning}"

@@ -54,7 +54,7 @@ def evaluate(
     problem : Problem
         Body, friction, limits and objective; its class of gaits is left out.
     gait : any gait, array, path of a CSV file, or callable
-        Joint angles: a series, ``(n_joint, n_time)`` at equal steps of a period, an xarray
+        Joint angles: a series, ``(n_joint, n_time)`` at equal steps of a cycle, an xarray
         DataArray with a dimension "joint" and one of times, a file with a column of times, or a
         function of phases ``(n_time,)``.
     period, harmonics, degrees
@@ -106,8 +106,8 @@ def evaluate(
             )
     if problem.regime.free is not None:
         raise ProblemError(
-            "a gait is evaluated at one pace, by an objective that does not speak of the period: "
-            "state froude=0.05 (a robot: one period), and such an objective."
+            "a gait is evaluated at one pace, by an objective without the period: "
+            "state froude=0.05 (a robot: one cycle), and such an objective."
         )
     stated, driven = with_motors(problem, series)
     if driven.shape_speed < (least := problem.smallest_shape_speed):
@@ -126,8 +126,8 @@ def evaluate(
         answer = on_fine_mesh(stated, driven)
     certificate, said = UNCERTIFIED, ""
     if goes_nowhere(answer):
-        said = " It goes nowhere for its work, so there is no value to certify: is it one that "
-        said += "retraces its path?"
+        said = " It has no net displacement, so there is nothing to certify: does it "
+        said += "retrace its path?"
     else:
         try:
             certificate = certify(answer)
@@ -143,13 +143,13 @@ def evaluate(
         if errors[0] > certificate.value_error:
             name = problem.objective.short
             what = f"{name} uncertain by {errors[0]:.1e} (two standard deviations{missed})"
-            said = f" Samples that far off leave {what}.{said}"
+            said = f" This residual leaves {what}.{said}"
         certificate = certificate.with_samples(errors)
     message = f"{fitted.describe()}.{said}"
     solution = Solution(stated, answer, certificate, message=message, settings=settings())
     if fitted.path is not None and fitted.went and certificate.replayed:
         solution.message += (
-            f" The points went {fitted.went:.3g} body lengths a period, "
+            f" The points went {fitted.went:.3g} body lengths per cycle, "
             f"{direction_of_travel(*fitted.path)}; predicted {certificate.distance:.3g} +- "
             f"{certificate.errors['distance']:.0e}, {solution.travels}."
         )

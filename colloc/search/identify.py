@@ -83,7 +83,7 @@ class Identified:
         return {"coefficients": finite, **plain, "line": self.line}
 
     def __str__(self) -> str:
-        words = {0.0: "as stated", math.inf: "not told by this motion"}
+        words = {0.0: "as stated", math.inf: "not determined by this motion"}
         rows = [
             f"{name:<10}  {value:<8.4g} {words.get(error, f'+- {error:.2g}')}"
             for name, (value, error) in self.coefficients.items()
@@ -169,7 +169,7 @@ def identify(
         check_finite(positive=True, mu_forward=mu_forward)
         if not fit.only_ratios:
             raise ProblemError(
-                "with inertia the motion tells all coefficients: leave mu_forward out."
+                "with inertia the motion determines all coefficients: leave mu_forward out."
             )
         fit.stated *= mu_forward / fit.stated[fit.forward]
     x = np.zeros(len(fit.free))
@@ -189,12 +189,12 @@ def identify(
     remarks = [fit.describe(direction) for direction in untold]
     if fit.only_ratios:
         remarks.append(
-            f"Slow motion tells ratios alone: one factor of all coefficients, here by "
+            f"Slow motion determines only ratios: a common factor, here fixed by "
             f"{fit.names[fit.forward]} as stated, changes only torques and work."
         )
     if after > _MISSED * fit.extent and alike > _ALIKE:
         remarks.append(
-            "No coefficients lead there: are lengths, order and signs of joints, and the side of y "
+            "No coefficients reproduce the path: are lengths, order and signs of joints, and y "
             "right?"
         )
     points = [name for name, k in _POINTS.items() if fit.seen[0, k].any() and name != "center"]
@@ -360,7 +360,7 @@ class _Fit:
         names = " and ".join(self.names[k] for k in parts)
         if parts.size == 1:
             others = " and ".join(name for name in self.names if name != names)
-            why = "the body moves alike whatever it is"
-            return f"This gait cannot tell {names} from {others}: {why}."
+            why = "it does not change the motion"
+            return f"This gait cannot distinguish {names} from {others}: {why}."
         by = ", ".join(f"{self.names[k]} {100 * np.expm1(0.1 * change[k]):+.0f} %" for k in parts)
-        return f"This gait cannot tell {names} apart: the body moves alike with {by}."
+        return f"This gait cannot distinguish {names}: the motion is the same with {by}."

@@ -253,7 +253,7 @@ _BALANCE = ("tail", "velocity", "force", "torque", "balance")
 _ADVICE = {
     _BALANCE: "start the continuation at a larger delta_start, use more intervals, or another "
     "formulation",
-    (ACTUATORS,): "allow the joints more, take other links, or start from another guess",
+    (ACTUATORS,): "relax the limits, use other links, or start from another guess",
     ("at least",): "ask for less, or start from a guess that reaches it",
     ("rotation",): "start from a guess with less net rotation, or impose a symmetry that closes it",
     ("joint", "links", "tangent"): "start from a guess of smaller amplitude",
@@ -312,7 +312,7 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
             ]
             function, most = each[(worst - rows.start) % len(limits.names)]
             units = {"moment": " weight x body length", "power": " weight x body length per period"}
-            failed = f"{what} is {most:g}{units.get(function, '')}, and the gait takes "
+            failed = f"{what} is {most:g}{units.get(function, '')}, and the gait needs "
             failed += f"{1 + excess:.4g} times as much {window}"
         advice = next(text for names, text in _ADVICE.items() if group.startswith(names))
     elif result.status == "still moving":

@@ -161,9 +161,7 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
     the gait is no optimum: it was given, or the solve did not end well.
     """
     if solution.answer.program == EVALUATED or not solution.problem.gait.free:
-        raise ProblemError(
-            "the gait was given: only of an optimum is it known how the best value changes."
-        )
+        raise ProblemError("this gait was not optimised: only an optimum has a sensitivity.")
     if not solution.success:
         raise ProblemError(
             f"only an optimum has a sensitivity, and this solve ended as: {solution.status}."
@@ -279,7 +277,7 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
         breaks.append(f"{excess:.2g} beyond its limits")
     closing = problem.regime.closing_symmetry(problem.gait.symmetry)
     if problem.rotation is not None and closing == NONE and abs(turned) > 1e-4:
-        breaks.append(f"turns {np.degrees(turned):+.2g}° too far a period")
+        breaks.append(f"turns {np.degrees(turned):+.2g}° too far per cycle")
     for aim, least in problem.at_least:
         if aim(kept.values) < least * (1 - 1e-5):
             breaks.append(f"{aim.name} {aim(kept.values):.4g}, not {least:.4g}")

@@ -79,7 +79,7 @@ def solve(
     except KeyboardInterrupt:
         clear_interrupt()
         over = time.monotonic() - begin >= seconds
-        why = f"the {seconds:g} s allowed are over" if over else "interrupted"
+        why = f"the {seconds:g} s allowed have passed" if over else "interrupted"
         solution = _best_so_far(problem, run, why)
     solution.seconds = time.monotonic() - begin
     for each in (solution, solution.shrunk):
@@ -116,8 +116,8 @@ def _say_reach(solution: Solution) -> None:
     least = {aim.name: least for aim, least in solution.problem.at_least}.get("distance")
     if asked is not None and least is not None and least < asked:
         solution.message = (
-            f"The farthest gait goes {2 * least:.3g} body lengths a period, less than the "
-            f"{asked:g} asked for, so half of that was: {least:.3g}. {solution.message}"
+            f"The farthest gait goes {2 * least:.3g} body lengths per cycle, less than the "
+            f"{asked:g} required, so half of that was required: {least:.3g}. {solution.message}"
         ).strip()
 
 
@@ -207,16 +207,15 @@ def certify_answer(problem: Problem, answer: Answer) -> Solution:
         better = "more efficient" if problem.objective == EFFICIENCY else "better"
         text = (
             f"this gait is as small as smallest_shape_speed = {problem.smallest_shape_speed:g} "
-            f"allows; smaller ones are {better} still. For a gait that a robot can make raise the "
+            f"allows; smaller ones are {better} still. For a gait that a robot can perform raise the "
             "bound; for smaller ones lower it (and delta with it)."
         )
     elif is_free and on_speed_floor(answer.problem, answer.gait):
         text = (
-            "Gaits that become smaller become better here, so the search kept them large: it met "
+            "Gaits improve here as they shrink, so the search kept them large: it found "
             "no better gait with a shape speed of "
-            f"{answer.problem.smallest_shape_speed:.2g} or more. For another size state "
-            f"smallest_shape_speed, or the distance, "
-            'at_least={"distance": 0.1}.'
+            f"{answer.problem.smallest_shape_speed:.2g} or more. For another size set "
+            'smallest_shape_speed, or at_least={"distance": 0.1}.'
         )
     if answer.delta < problem.delta * (1 - 1e-9):
         text += (
@@ -264,8 +263,8 @@ def choose(problem: Problem, solutions: Sequence[Solution]) -> Solution:
     if finite and smaller and not problem.shrinking:
         solution.shrunk = max(smaller, key=value)
         text = (
-            f"A tiny gait does better still, {solution.shrunk.certificate.value:.6f}, but nobody "
-            f"would see it move: it is saved beside this one."
+            f"A tiny gait is better still, {solution.shrunk.certificate.value:.6f}, but of no "
+            f"practical use: it is saved beside this one."
         )
         solution.message = f"{solution.message} {text}".strip()
     return solution

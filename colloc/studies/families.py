@@ -4,7 +4,7 @@ Pareto fronts by the epsilon-constraint method, from their ends inwards: where n
 apart in an objective, the other one is maximised at a level between, from the neighbour that
 reaches it. What is no better than these leaves a gap. Only the gaits that are left are certified.
 
-Steering: the best gait for every turn per period. After the straight gait, others are sought in
+Steering: the best gait for every turn per cycle. After the straight gait, others are sought in
 the class without symmetry, each from its neighbour, or from the mirror image of the opposite turn.
 Controllers can interpolate between neighbours.
 """
@@ -317,7 +317,7 @@ def _apart(front: list[_Point], intervals: int) -> dict[tuple[_Point, _Point], n
 
 @dataclass(frozen=True, eq=False)
 class Steering:
-    """Family of gaits by the angle that a period turns."""
+    """Family of gaits by the angle that a cycle turns."""
 
     problem: Problem
     turns: tuple[float, ...]  # counter-clockwise [rad], ascending
@@ -332,7 +332,7 @@ class Steering:
 
     @property
     def efficiency(self) -> np.ndarray:
-        """Chord of the arc of a period per work, independent of the phase at which it begins."""
+        """Chord of the arc of a cycle per work, independent of the phase at which it begins."""
         return np.array([point.arc.chord / point.work for point in self.points])
 
     @property
@@ -376,7 +376,7 @@ class Steering:
     def __repr__(self) -> str:
         turns = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)
         verdict = "all certified" if self.certified else "NOT all certified"
-        return f"<Steering of {self.problem.name}: {turns} degrees a period, {verdict}>"
+        return f"<Steering of {self.problem.name}: {turns} degrees per cycle, {verdict}>"
 
 
 def _outwards(turns: Sequence[float], middle: float) -> Iterator[tuple[float, float]]:
@@ -396,7 +396,7 @@ def steer(
     starts: int = OPTIONS.starts,
     progress: Callable[[float, Solution], object] | None = None,
 ) -> Steering:
-    """Find the best gaits of a problem for given turns per period.
+    """Find the best gaits of a problem for given turns per cycle.
 
     Parameters
     ----------
@@ -423,7 +423,7 @@ def steer(
     >>> import colloc
     >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     >>> colloc.steer(problem, [0.0, 0.1], starts=1)
-    <Steering of quick: +0, +5.73 degrees a period, all certified>
+    <Steering of quick: +0, +5.73 degrees per cycle, all certified>
     """
     if not problem.gait.free or problem.regime.slides or problem.rotation != 0:
         raise ProblemError(
@@ -434,7 +434,7 @@ def steer(
     possible = all(is_number(turn) and abs(turn) < math.pi for turn in (*turns, *spot))
     if not len(turns) or not possible or 0 in spot:
         raise ProblemError(
-            f"turns must be angles of less than half a turn a period, and not 0 on the spot; not "
+            f"turns must be angles of less than half a turn per cycle, and not 0 on the spot; not "
             f"{[*turns, *spot]!r}."
         )
     check_count(starts=starts)

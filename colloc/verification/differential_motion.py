@@ -12,7 +12,7 @@ work of the joints, by their moments, is the work against friction + g climb.
 
 *Inertia.* At the Froude number Fr = L/(g T^2) mass times acceleration counts against friction as Fr
 to mu; at 0 this is `colloc.replay`. The period that leaves the momenta as they are is found by
-shooting: Adams' and Gear's methods, and Newton's on the map of a period.
+shooting: Adams' and Gear's methods, and Newton's on the map of a cycle.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ _USUAL = 0.125
 _MOST_STEPS = 30
 _OTHER = 1e-2  # momenta [body lengths per period] by which two motions differ that are not one
 _KINK, _NARROWEST = 1e-3, 1e-9
-"""Least part of the period that a panel's error is held against, as kinks are few; least width."""
+"""Least part of the cycle that a panel's error is held against, as kinks are few; least width."""
 _END = np.ones(1)
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 _Breaks = np.ndarray | tuple[float, ...]
@@ -136,7 +136,7 @@ class _Gait:
         self, ran: Course, z: np.ndarray, values: Numbers, errors: Numbers, objective: Objective,
         limits: PathLimits, **more: Any,
     ) -> Replay:  # fmt: skip
-        """The record of a run through a period, at whose phases the tail's velocities are z."""
+        """The record of a run through a cycle, at whose phases the tail's velocities are z."""
         angles, _ = self.path(t := ran.phases % 1.0)
         shares = np.empty(0)
         if limits.names:  # of torques, perhaps, which are infinite at corners
@@ -158,7 +158,7 @@ class SlopeMotion:
     aside: np.ndarray  # to the left of it
     friction_work: np.ndarray  # [pressing force x body length]
     joint_work: np.ndarray  # by the moments in the joints
-    steering: np.ndarray  # derivative of a period's last heading by its first, always positive
+    steering: np.ndarray  # derivative of a cycle's last heading by its first, always positive
     error: float
     """Error of headings, ways and works at the end: their change where steps may err 30 times as
     much."""
@@ -173,7 +173,7 @@ class SlopeMotion:
     def __repr__(self) -> str:
         count = self.climb.size
         return (
-            f"<SlopeMotion of {count} period{'s' * (count > 1)} on a grade of {self.grade:g}: "
+            f"<SlopeMotion of {count} cycle{'s' * (count > 1)} on a grade of {self.grade:g}: "
             f"climb {self.climb.sum():.6g}, work of the joints {self.joint_work.sum():.6g}, "
             f"heading {self.headings[0]:.4f} -> {self.headings[-1]:.4f}>"
         )
@@ -202,7 +202,7 @@ class GaitOnSlope(_Gait):
     def integrate(
         self, begin: np.ndarray | float, tolerance: float, longest: float = np.inf
     ) -> Course:
-        """The states through a period, from the first of them at its begin."""
+        """The states through a cycle, from the first of them at its begin."""
 
         def rates(
             t: float, state: np.ndarray, near: np.ndarray | None
@@ -244,7 +244,7 @@ class GaitOnSlope(_Gait):
     def replay(
         self, objective: Objective, tolerance: float, known: Any, limits: PathLimits, instants: int
     ) -> Replay:
-        """A period of a gait that says where it points: the distance is the way in the direction
+        """A cycle of a gait that says where it points: the distance is the way in the direction
         that counts, the work that of the joints."""
 
         theta_0 = self.path.theta  # type: ignore[attr-defined]
@@ -306,7 +306,7 @@ def slope_motion(
         The same by the direction of the tail link at phase 0; instead of a heading.
     periods : int
     tolerance : float
-        Of headings, ways and works over a period, about; what is left is stated
+        Of headings, ways and works over a cycle, about; what is left is stated
         (`SlopeMotion.error`).
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump, as `gait.corner_phases`.
@@ -355,7 +355,7 @@ def slope_motion(
 
 
 class RoughPeriod(NamedTuple):
-    """A period that leaves the momenta as they are, but for `_rough`. What k quantities sum up to
+    """A cycle that leaves the momenta as they are, but for `_rough`. What k quantities sum up to
     counts as states, too."""
 
     momenta: np.ndarray  # at the start, (3,)
@@ -364,7 +364,7 @@ class RoughPeriod(NamedTuple):
 
 
 class PeriodicRun(NamedTuple):
-    """A period that leaves the momenta as they are, to an error `aim`."""
+    """A cycle that leaves the momenta as they are, to an error `aim`."""
 
     course: Course
     momenta: np.ndarray
@@ -407,7 +407,7 @@ class GaitWithInertia(_Gait):
         return momenta(self.body, posture, self.body.velocity(posture, rates, z))[:, 0]
 
     def run(self, start: np.ndarray, aim: float) -> Course:
-        """The states through a period from a state ``(7,)``, momenta ``(3,)`` at the origin, or
+        """The states through a cycle from a state ``(7,)``, momenta ``(3,)`` at the origin, or
         several states ``(n, 7)``, with the same steps."""
         if start.shape == (3,):
             start = np.append(start, [self.theta, 0.0, 0.0, 0.0])
@@ -471,7 +471,7 @@ class GaitWithInertia(_Gait):
         }
 
     def period_map(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States before and after a period ``(7 + k, 2)``, and derivatives of the latter by the
+        """States before and after a cycle ``(7 + k, 2)``, and derivatives of the latter by the
         momenta before it, ``(7 + k, 3)``, by differences."""
         begin = np.zeros((4, 7))
         begin[:, _MOMENTA] = start + np.vstack([np.zeros(3), _APART * np.eye(3)])
@@ -503,7 +503,7 @@ class GaitWithInertia(_Gait):
         return self.rough_period(np.zeros(3))
 
     def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray) -> PeriodicRun:
-        """A period that leaves the momenta as they are, to an error, from a `RoughPeriod`."""
+        """A cycle that leaves the momenta as they are, to an error, from a `RoughPeriod`."""
         start, before = near, np.inf
         for _ in range(_MOST_STEPS):
             course = self.run(start, aim)
@@ -517,14 +517,14 @@ class GaitWithInertia(_Gait):
 
     def _not_alike(self) -> NotConvergedError:
         return NotConvergedError(
-            f"at a Froude number of {self.froude:g} no motion was found in which all periods are "
+            f"at a Froude number of {self.froude:g} no motion was found in which all cycles are "
             f"alike; try a smaller one."
         )
 
     def errors(self, ran: PeriodicRun, before: PeriodicRun, slopes: np.ndarray) -> Numbers:
         """Errors of the `totals` of a run, seen from one whose steps might err more.
 
-        From a start s a run ends at F(s) + e, F being the exact map of a period. The true motion
+        From a start s a run ends at F(s) + e, F being the exact map of a cycle. The true motion
         starts at s* = F(s*); so, M being the derivatives of the momenta, gap what is left open,
 
             s* - s = (I - M)^-1 (gap - e).
@@ -601,7 +601,7 @@ class GaitWithInertia(_Gait):
 
 
 def amplification(slopes: np.ndarray) -> np.ndarray:
-    """Derivatives ``(7 + k, 3)`` of the end of a period by what each adds to the momenta."""
+    """Derivatives ``(7 + k, 3)`` of the end of a cycle by what each adds to the momenta."""
     return np.asarray(np.linalg.solve(np.eye(3) - slopes[_MOMENTA].T, slopes.T).T)
 
 
@@ -614,7 +614,7 @@ class FromRest(NamedTuple):
 
     phases: np.ndarray  # where the solver stepped, (n,), from 0 to the number of periods
     states: np.ndarray  # there, as `Replay.states`, (7, n)
-    periods: np.ndarray  # distance, work and rotation of each period, (n_period, 3)
+    periods: np.ndarray  # distance, work and rotation of each cycle, (n_period, 3)
 
 
 def motion_from_rest(
@@ -647,7 +647,7 @@ def motion_from_rest(
         Froude number L/(g T^2), above 0.
     periods : int
     tolerance : float
-        About the error of the states after a period.
+        About the error of the states after a cycle.
     grade : float
         Tangent of the inclination of a slope. There gravity, in the Froude number too, is that
         which presses the body on the ground, and +x is straight uphill; friction need not hold the

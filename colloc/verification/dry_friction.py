@@ -1,4 +1,4 @@
-"""A period of a gait at delta = 0: distance, work and efficiency between bounds.
+"""A cycle of a gait at delta = 0: distance, work and efficiency between bounds.
 
 An associated law (equal coefficients, or the elliptic one) is minus the gradient of its dissipation
 D, a norm of the velocity at each point. At delta = 0 the balance is a cone program over the three
@@ -53,7 +53,7 @@ class DryFriction(NamedTuple):
     distance: Between
     work: Between
     open: float
-    """Part of the period at which velocities are not known to 1 % of the largest rate."""
+    """Part of the cycle at which velocities are not known to 1 % of the largest rate."""
     instants: int
 
     @property
@@ -63,9 +63,9 @@ class DryFriction(NamedTuple):
     def __str__(self) -> str:
         least, most = self.efficiency
         several = (
-            f"; the motion is open at {100 * self.open:.2g} % of the period" if self.open else ""
+            f"; the motion is open at {100 * self.open:.2g} % of the cycle" if self.open else ""
         )
-        return f"d/W between {least:.8f} and {most:.8f}, at {self.instants} instants{several}"
+        return f"d/W between {least:.8f} and {most:.8f}, at {self.instants} time points{several}"
 
     def facts(self) -> dict:
         intervals = {name: list(getattr(self, name)) for name in ("efficiency", "distance", "work")}
@@ -198,7 +198,7 @@ def dry_friction(
     tolerance: float = 1e-6,
     turn: float = 0.0,
 ) -> DryFriction:
-    """Distance of the centre of mass and work over a period at delta = 0, with the arguments of
+    """Distance of the centre of mass and work over a cycle at delta = 0, with the arguments of
     `colloc.replay`. `ProblemError` for bodies that are no chains, and laws that have no bounds."""
     if not isinstance(body, Chain):
         raise ProblemError(

@@ -189,7 +189,7 @@ def replay(
     froude: float = 0.0,
     regime: Regime = LEVEL,
 ) -> Replay:
-    """Distance, work, rotation and length of a path over one period, to a relative error in the
+    """Distance, work, rotation and length of a path over one cycle, to a relative error in the
     efficiency, or an objective.
 
     Parameters
@@ -258,7 +258,7 @@ def replay(
         return moving.replay(objective, tolerance, paths, limits, near)
     if "period" in objective.uses:
         raise ProblemError(
-            f"the objective {objective.name!r} speaks of the period: give the froude at which it "
+            f"the objective {objective.name!r} uses the period: give the froude at which it "
             f"is played."
         )
     if not 4 <= instants <= MOST_INSTANTS or instants % 2:

@@ -26,7 +26,7 @@ _APPROACH = 5000  # steps in which the clock of an approach is summed up
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """One period at a fixed rate of samples; the sample after the last is the first."""
+    """One cycle at a fixed rate of samples; the sample after the last is the first."""
 
     time: np.ndarray  # seconds, 0, 1/rate, ..., period - 1/rate, (n,)
     phase: np.ndarray  # of the gait, in [0, 1), (n,)
@@ -66,14 +66,14 @@ def plan_trajectory(
     if wanted < shortest * (1 - 1e-9):
         kept = " at the gait's own pace, which matters here" if keep_pace else ""
         raise ProblemError(
-            f"a period of {wanted:g} s is too short for the joint speed limits{kept}; use at least "
+            f"a cycle of {wanted:g} s is too short for the joint speed limits{kept}; use at least "
             f"{shortest:.6g} s."
         )
     count = int(np.ceil(wanted * rate - 1e-9))
     if not 4 <= count <= MOST_SAMPLES:
         raise ProblemError(
-            f"{count:g} samples a period are too {'few' if count < 4 else 'many'}; change the rate "
-            f"or the period."
+            f"{count:g} samples per cycle are too {'few' if count < 4 else 'many'}; change the "
+            f"rate or the period."
         )
     period, level = count / rate, 0.0
 
@@ -107,7 +107,7 @@ class Approach(NamedTuple):
 def approach(trajectory: Trajectory, rate: float, limits: np.ndarray) -> Approach:
     """Grow a gait from the straight body at rest into a trajectory within limits ``(n_joint,)``.
 
-    Over a period joints are ``a(t) q(t)``, a rising from 0 to 1 and flat at both ends; where a
+    Over a cycle joints are ``a(t) q(t)``, a rising from 0 to 1 and flat at both ends; where a
     joint would be too fast, the clock slows down.
     """
     from scipy.interpolate import CubicHermiteSpline

@@ -233,7 +233,7 @@ def test_friction_of_an_mjcf_is_that_of_geoms_on_the_floor_and_what_is_not_taken
     capsys.readouterr()
     mixed = slippery.replace('<geom fromto="0.01', '<geom friction="0.7" fromto="0.01')
     assert read(tmp_path, mixed, kind="xml").friction == Friction(1, 1, 1)
-    assert "from 0.4 to 0.7, are not taken: state --mu" in capsys.readouterr().out
+    assert "from 0.4 to 0.7, are not used: state --mu" in capsys.readouterr().out
     assert read(tmp_path, mixed, "--mu", "0.5", kind="xml").friction.mu_f == 0.5
     assert "not taken" not in capsys.readouterr().out
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'

@@ -136,5 +136,5 @@ def test_an_instant_without_any_balance_is_said_to_have_none(monkeypatch):
     monkeypatch.setattr("colloc.mechanics.solution_branches.all_balanced_velocities", lost)
     angles, rates = ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 20))
     law = Friction(mu_t=1.0, mu_f=0.01, mu_b=100.0)
-    with pytest.raises(NotConvergedError, match="at 1 of 20 instants"):
+    with pytest.raises(NotConvergedError, match="at 1 of 20 time points"):
         followed_motion(Instants(Chain(), law, angles, rates, 1e-4))

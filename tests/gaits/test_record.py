@@ -48,10 +48,10 @@ READ = {
     "one column of degrees": ("t,joint_1_rad,joint_2_deg,joint_3_rad\n" + table(SECONDS, A, E, C), r"radians \(but joint_2_deg degrees\)"),
     "the joint at the tail in degrees": ("t,joint_1_deg,joint_2_rad,joint_3_rad\n" + table(SECONDS, D, B, C), r"radians \(but joint_1_deg degrees\)"),
     "units in a row": ("time,joint_1,joint_2,joint_3,current_1\ns,deg,deg,deg,mA\n" + table(SECONDS, D, E, F, T),
-        "degrees; time in s; left out: current_1 mA"),
+        "degrees; time in s; ignored: current_1 mA"),
     "rostopic echo": (ROS + table(NANOSECONDS, range(60), ["base"] * 60, ["j"] * 60, A, B, C, A), "from field.position0"),
     "PlotJuggler": ("__time," + ",".join(f"{TOPIC}{j}/{what}" for j in (1, 2, 3) for what in ("position", "velocity")) + "\n" + table(1.7e9 + SECONDS, A, A, B, B, C, C, digits=16),
-        "left out: /joint_states/joint_1/velocity"),
+        "ignored: /joint_states/joint_1/velocity"),
     "driver of an arm": ("time_ms,read_attempt,joint_0_pos,joint_1_pos,joint_2_pos,joint_0_vel,joint_1_vel,joint_2_vel\n" + table(1000 * SECONDS, range(60), A, B, C, A, B, C),
         "from joint_0_pos ... joint_2_pos"),
     "commanded and measured": ("t,cmd_1,cmd_2,cmd_3,meas_1,meas_2,meas_3\n" + table(SECONDS, B, C, A, A, B, C), "from meas_1 ... meas_3"),
@@ -154,7 +154,7 @@ def test_the_period_of_a_record_that_holds_several_is_found(periods, noise, tmp_
     found = read(tmp_path, "t,q1,q2,q3\n" + table(4 * t, *angles))
     assert found.period == pytest.approx(4, rel=1e-7 if noise == 0 else 5e-3)
     np.testing.assert_allclose(found.gait.angles(T - t[0]), ANGLES, atol=1e-6 + 0.8 * noise)
-    assert f"of {found.periods:.3g} periods of" in found.describe()
+    assert f"of {found.periods:.3g} cycles of" in found.describe()
 
 
 def test_where_a_period_is_told_from_a_wave_its_phase_at_the_start_is_known_half_as_well(tmp_path):

@@ -93,7 +93,7 @@ def test_feet_wheels_and_pads_differ_and_the_key_says_which_is_which(unsolved):
 
 
 def test_a_figure_in_the_lab_says_of_how_many_periods_it_is(unsolved):
-    for size, counted in ((0.4, "1 period"), (1.2, "3 periods")):
+    for size, counted in ((0.4, "1 cycle"), (1.2, "3 cycles")):
         draw_lab(axes := Figure().add_subplot(), unsolved(snake(size)))
         assert axes.get_xlabel().endswith(counted)
 

@@ -204,7 +204,7 @@ def test_the_page_of_a_turning_gait_states_angle_and_radius_and_claims_no_straig
     assert f"{np.degrees(turning.rotation):+.2f}° turned a cycle" in text
     assert f"{turning.turning_radius:.4g} radius of the circle it crawls" in text
     assert words in text
-    assert "turned by the angle that was asked for" in text
+    assert "turned by the requested angle" in text
     assert "straight" not in text
     assert words in " ".join(outline(turning._repr_html_()).text)
     assert turning.to_xarray().attrs["turning_radius"] == turning.turning_radius

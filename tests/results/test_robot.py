@@ -171,7 +171,7 @@ def test_where_torques_depend_on_the_pace_no_other_pace_is_promised(unsolved):
     sheet = str(swimmer.robot(**SIZE))
     assert "coefficients are taken to be those in units of this period" in sheet
     for name in ("max_speed", "max_torque"):
-        said = f"{name} asks for another pace, and torques depend on it"
+        said = f"{name} needs another pace, and torques depend on it"
         with pytest.raises(ProblemError, match=said):
             swimmer.robot(**SIZE, **{name: 1.0})
 

@@ -151,7 +151,7 @@ def test_what_the_motion_does_not_tell_stays_as_stated_and_is_said(tmp_path):
 
     path = recorded(tmp_path / "a.csv", colloc.evaluate(standing(0.05), WAVE))
     found = colloc.identify(standing(0.08), path)
-    assert any("cannot tell mu_f from mu_t and mu_b" in each for each in found.remarks)
+    assert any("cannot distinguish mu_f from mu_t and mu_b" in each for each in found.remarks)
     assert found.coefficients["mu_b"][1] == np.inf
     assert found.facts()["coefficients"]["mu_b"][1] is None
     value = {name: value for name, (value, _) in found.coefficients.items()}

@@ -283,7 +283,7 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     # another seed joins the same archive, and says what else is there
     code, said, _ = run("--starts", 2, "--seed", 1)
     assert (code, asked) == (0, [2, 3, 0, 1])
-    assert "starts in the file besides: 4; the best of all, 0.200000" in said
+    assert "other starts in the file: 4; the best of all, 0.200000" in said
     assert sorted(kept().of_search(SAMPLERS[0], 0)) == [0, 1, 2, 3]
     assert sorted(kept().of_search(SAMPLERS[0], 1)) == [0, 1]
     # another problem of the same name does not

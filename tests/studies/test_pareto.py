@@ -64,7 +64,7 @@ def test_the_figure_draws_no_line_over_a_gap(front):
     assert np.isnan(drawn[2]).all()
     np.testing.assert_array_equal(np.delete(drawn, 2, axis=0), front.values[:, ::-1])
     np.testing.assert_array_equal(axes.lines[1].get_xydata(), front.values[1:3, ::-1])
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["nothing found between"]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["no gait found between"]
 
 
 def test_where_one_gait_is_best_in_both_it_is_the_only_point():

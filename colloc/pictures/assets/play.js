@@ -71,7 +71,7 @@ function balanced(body, q, dq, z, mu, delta) {
   return [z, NaN];
 }
 
-// a period of a wave of joint angles: way of the centre of mass, turn, work, and where the joints are at each step
+// a cycle of a wave of joint angles: way of the centre of mass, turn, work, and where the joints are at each step
 function crawl(body, gait, mu, delta, steps) {
   const n = body.lengths.length, frames = [];
   const wave = (t, turn) => Array.from({ length: n - 1 }, (_, j) => {
