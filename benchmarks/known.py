@@ -194,6 +194,8 @@ def markdown(rows: Iterable[Known]) -> str:
 
     def line(row: Known) -> str:
         problem = row.problem
+        asked = problem.asked.replace("friction (1, 1, 1)", "isotropic")
+        asked = asked.replace("symmetry none", "no symmetry").replace("symmetry ", "")
         told = f"{row.value:.6f} ± {row.value_error:.0e}"
         limit = (
             f"{row.value_at_zero_delta:.6f} ± {row.value_error_at_zero_delta:.0e}"
@@ -205,6 +207,6 @@ def markdown(rows: Iterable[Known]) -> str:
             if row.dry is None or problem.objective != EFFICIENCY
             else "{:.6f} to {:.6f}".format(*row.dry)
         )
-        return f"| {problem.name} | {problem.asked} | {told} | {limit} |\n"
+        return f"| {problem.name} | {asked} | {told} | {limit} |\n"
 
     return heads + "".join(map(line, rows))

@@ -13,7 +13,7 @@ from colloc.system.environment import higher
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
-PACKAGES = tuple(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE))
+PACKAGES = tuple(re.findall(r"^- `(\w+)`: ", PAGE, re.MULTILINE))
 """The packages of the library as the page lists them, lower ones first."""
 BESIDE = {"__init__", "__main__", "solve"}
 """What lies beside the packages: the face, ``python -m colloc`` and ``python -m colloc.solve``."""

@@ -207,8 +207,8 @@ def certify_answer(problem: Problem, answer: Answer) -> Solution:
         better = "more efficient" if problem.objective == EFFICIENCY else "better"
         text = (
             f"this gait is as small as smallest_shape_speed = {problem.smallest_shape_speed:g} "
-            f"allows; smaller ones are {better} still. For a gait that a robot can perform raise the "
-            "bound; for smaller ones lower it (and delta with it)."
+            f"allows; smaller ones are {better} still. For a gait that a robot can perform raise "
+            "the bound; for smaller ones lower it (and delta with it)."
         )
     elif is_free and on_speed_floor(answer.problem, answer.gait):
         text = (
