@@ -71,8 +71,8 @@ def slow_enough(
 
     A body of length L [m] that takes T [s] per cycle has the Froude number L / (9.81 T^2); so T
     must be sqrt(L / (9.81 Fr)) or more. Played faster a gait may be better or worse: either is a
-    change. Paces are tried from slow to fast, each at most five times the one before in Fr, so a change
-    that comes and goes between two of them is not seen.
+    change. Paces are tried from slow to fast, each at most five times the one before in Fr, so a
+    change that comes and goes between two of them is not seen.
 
     Parameters
     ----------

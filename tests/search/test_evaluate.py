@@ -197,7 +197,7 @@ def test_stated_errors_hold_for_gaits_through_noisy_samples_and_grow_with_the_no
         stated = noisy.certificate
         assert 1e-4 * degrees < stated.value_error < 2e-2 * degrees
         assert stated.value_error == stated.efficiency_error
-        told = f"leave d/W uncertain by {stated.of_samples[0]:.1e} (two standard deviations"
+        told = f"leaves d/W uncertain by {stated.of_samples[0]:.1e} (two standard deviations"
         assert told in noisy.message
         wrong = (
             (noisy.efficiency - exact.efficiency) / stated.efficiency_error,
