@@ -85,7 +85,7 @@ class Regime:
     @property
     def pace(self) -> str:
         """Why the pace of a gait matters; empty if it does not."""
-        return "what is heavy takes time to move" if self.froude else ""
+        return "inertia counts" if self.froude else ""
 
     @property
     def label(self) -> str:

@@ -148,7 +148,7 @@ def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_as_they_all
 def test_weak_motors_are_told_whether_a_longer_period_helps(three_link):
     """At 5 s joints need 2.36 N m, slowly 1.96."""
     assert "Torque limits are met at this pace" in str(three_link.robot(**SIZE, max_torque=4))
-    assert "take a longer period" in str(three_link.robot(**SIZE, max_torque=2.2))
+    assert "use a longer cycle" in str(three_link.robot(**SIZE, max_torque=2.2))
     weak = three_link.robot(**SIZE, max_torque=[4, 1.5])
     said = "Joint 2 needs 2.36 N m and has 1.5. Motors are too weak in slow motion as well"
     assert said in str(weak)
@@ -252,7 +252,7 @@ def test_the_sheet_of_a_gait_with_inertia_is_of_its_own_pace_alone(braking):
     for factor in (0.95, 1.05):
         with pytest.raises(ProblemError, match=said):
             braking.robot(LENGTH, MASS, factor * PERIOD)
-    with pytest.raises(ProblemError, match="max_torque asks for another pace"):
+    with pytest.raises(ProblemError, match="max_torque needs another pace"):
         braking.robot(LENGTH, MASS, PERIOD, max_torque=1.0)
     robot = braking.robot(LENGTH, MASS, 1.004 * PERIOD)
     assert robot.froude == pytest.approx(FROUDE, rel=1e-2)
@@ -326,7 +326,7 @@ def test_an_export_on_a_slope_is_of_the_shorter_robot_that_has_that_pace_there(u
     stated = Problem("steep", leaning, gait=Harmonic(1), delta=1e-2, froude=0.05, grade=0.75)
     solution, length = unsolved(stated), 0.05 * 0.8 * 9.81 * 2.0**2
     facts = solution.export(tmp_path / "x.csv", period=2.0, ramp=False)
-    assert f"of a robot of {length:.3g} m in this period" in facts["pace"]
+    assert f"a robot of {length:.3g} m at this period" in facts["pace"]
     assert solution.robot(length, MASS, 2.0).froude == pytest.approx(0.05)
 
 

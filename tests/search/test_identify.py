@@ -182,7 +182,7 @@ def test_a_path_of_another_body_is_not_explained(crawled, tmp_path):
     rows[:, 3] += 0.3 * np.sin(rows[:, 0])
     head = path.read_text().split("\n")[0]
     np.savetxt(path, rows, "%.9g", ",", header=head, comments="")
-    assert "No coefficients lead there" in str(colloc.identify(FLOOR, path))
+    assert "No coefficients reproduce the path" in str(colloc.identify(FLOOR, path))
 
 
 def test_the_command_prints_what_to_write_into_the_problem_file(crawled, tmp_path, capsys):
