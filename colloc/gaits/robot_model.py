@@ -371,7 +371,7 @@ def _chain(parts: list[_Part]) -> Model:
     mus = {mu for part in parts for each in part.friction if part not in directed for mu in each}
     if len(mus) > 1:
         notes.append(
-            f"its coefficients of friction, from {min(mus):g} to {max(mus):g}, are not taken: "
+            f"its coefficients of friction, from {min(mus):g} to {max(mus):g}, are not used: "
             f"state --mu"
         )
     motors = ([getattr(x, name) for x in joints] for name in ("speed", "torque"))

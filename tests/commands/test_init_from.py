@@ -235,14 +235,14 @@ def test_friction_of_an_mjcf_is_that_of_geoms_on_the_floor_and_what_is_not_taken
     assert read(tmp_path, mixed, kind="xml").friction == Friction(1, 1, 1)
     assert "from 0.4 to 0.7, are not used: state --mu" in capsys.readouterr().out
     assert read(tmp_path, mixed, "--mu", "0.5", kind="xml").friction.mu_f == 0.5
-    assert "not taken" not in capsys.readouterr().out
+    assert "not used" not in capsys.readouterr().out
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
     damped = [each.replace("</inertial>", inertia) for each in WORM]
     damped[-1] = damped[-1].replace("</joint>", '<dynamics damping="0.1"/></joint>')
     read(tmp_path, damped)
     said = capsys.readouterr().out
     assert (
-        "not taken: moments of inertia (links count as uniform rods), friction and damping" in said
+        "not used: moments of inertia (links count as uniform rods), friction and damping" in said
     )
 
 

@@ -83,7 +83,7 @@ def test_what_is_no_number_of_a_replay_is_held_against_it_too(three_link, tmp_pa
     )
     for other, said in (
         (lax, "allows 1e+00 for the check 'second order'"),
-        (checks[:-1], "has not the checks of a new one"),
+        (checks[:-1], "lacks the checks"),
     ):
         certificate = replace(three_link.certificate, checks=other)
         file = save(replace(three_link, certificate=certificate), tmp_path / "x.h5")

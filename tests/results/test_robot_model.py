@@ -214,7 +214,7 @@ def test_the_command_writes_both_and_says_what_is_missing(three_link, tmp_path, 
     assert ElementTree.parse(tmp_path / "mine.urdf").getroot().tag == "robot"
     printed = capsys.readouterr().out
     assert "a robot of 1.2 m and 3 kg" in printed
-    assert "body lengths per cycle on its floor" in printed
+    assert "predicted steady motion on its floor" in printed
     assert "elliptic" not in printed  # the same friction in all directions
     assert main([source, "--format", "urdf"]) == 2
     assert "needs the period [s], the length [m] and the mass [kg]" in capsys.readouterr().err
