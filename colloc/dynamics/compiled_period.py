@@ -11,7 +11,7 @@ import numpy as np
 
 from colloc.dynamics.dynamics import PeriodTotals, QuasiStatic, Shapes, TotalGradient
 from colloc.mechanics.balance import is_chain
-from colloc.mechanics.native_kernel import chain_parameters, native_kernel
+from colloc.mechanics.native_kernel import addresses, chain_parameters, native_kernel
 from colloc.numerics.mesh import Mesh
 
 _DRY = 1e-6
@@ -26,8 +26,10 @@ class CompiledPeriod:
     def __init__(self, kind: QuasiStatic, mesh: Mesh) -> None:
         self._library, self._n_point = native_kernel(kind.body, kind.law), mesh.n_point
         scheme = mesh.scheme.A, mesh.scheme.b, mesh.h, mesh.points.astype(np.int64)
-        self._chain = *chain_parameters(kind.body, kind.law), mesh.n_point, 0, mesh.n_point
-        self._mesh = mesh.n, mesh.scheme.s, *scheme, kind.turn
+        chain = *chain_parameters(kind.body, kind.law), mesh.n_point, 0, mesh.n_point
+        points = mesh.n, mesh.scheme.s, *scheme, kind.turn
+        # addresses once: to look up one takes a microsecond
+        self._memory, self._chain, self._mesh = (chain, points), addresses(chain), addresses(points)
 
     @classmethod
     def of(cls, kind: QuasiStatic, mesh: Mesh) -> Self | None:
@@ -66,9 +68,10 @@ class CompiledPeriod:
 
     def _call(self, name: str, shapes: Shapes, *arguments: object) -> None:
         pace = np.full(self._n_point, shapes.pace, dtype=float)
-        given = (
+        given = [
             np.ascontiguousarray(each) if isinstance(each, np.ndarray) else each
-            for each in (*self._chain, *shapes[:3], *self._mesh, pace, *arguments)
-        )  # fmt: skip
-        if getattr(self._library, name)(*given):
+            for each in (*shapes[:3], pace, *arguments)
+        ]
+        motion = *given[:3], *self._mesh, *given[3:]
+        if getattr(self._library, name)(*self._chain, *motion):
             raise MemoryError("no memory for the links of a body.")

@@ -22,6 +22,8 @@ COEFFICIENTS = {
     "mu_b": "friction backwards",
     "normal": "drag sideways",
     "tangential": "drag along",
+    "rolling": "rolling resistance",
+    "sideways": "slip resistance",
     "power": "power of the speed in friction",
 }
 _SHARES = {"lengths": "length", "weights": "weight", "masses": "mass"}

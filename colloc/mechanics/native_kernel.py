@@ -13,7 +13,7 @@ import ctypes
 import hashlib
 import multiprocessing
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, lru_cache
 from importlib import resources
@@ -35,12 +35,21 @@ _PIECE = 4000
 
 
 class _Array:
-    """A contiguous array by its address; None is a null pointer."""
+    """A contiguous array by its address, or that address; None is a null pointer."""
 
     @classmethod
-    def from_param(cls, array: np.ndarray | None) -> ctypes.c_void_p:
-        assert array is None or array.flags.c_contiguous
-        return ctypes.c_void_p(None if array is None else array.ctypes.data)
+    def from_param(cls, array: Any) -> ctypes.c_void_p | None:
+        return address(array) if isinstance(array, np.ndarray) else array
+
+
+def address(array: np.ndarray) -> ctypes.c_void_p:
+    assert array.flags.c_contiguous
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def addresses(arguments: Iterable[Any]) -> tuple[Any, ...]:
+    """Arguments with addresses for arrays, which have to live on."""
+    return tuple(address(x) if isinstance(x, np.ndarray) else x for x in arguments)
 
 
 _TYPES = {

@@ -256,7 +256,8 @@ class _Fit:
         values, self.groups = zip(*groups.values(), strict=True)
         self.stated, short = np.array(values), [name.split(" of ")[0] for name in groups]
         self.names = short if len({*short}) == len(short) else [*groups]
-        self.forward = next((k for k, x in enumerate(short) if x in ("mu_f", "tangential")), 0)
+        along = {"mu_f", "tangential", "rolling"}
+        self.forward = next((k for k, x in enumerate(short) if x in along), 0)
         self.only_ratios = not problem.froude and problem.law.degree is not None
         every = range(len(short))
         self.free = [k for k in every if k != self.forward or not self.only_ratios]

@@ -140,6 +140,18 @@ def test_wheels_have_one_coefficient_of_rolling(tmp_path):
     assert "friction=Friction(mu_t=" in found.line
 
 
+@pytest.mark.slow
+def test_a_robot_that_coasts_on_axles_tells_what_resists_rolling_and_slip(tmp_path):
+    def wheeled(rolling, sideways):
+        feet = [Wheel(k, rolling=rolling, sideways=sideways, axle=True) for k in range(3)]
+        return Problem("axles", body=Chain((0.3, 0.4, 0.3), feet=feet), delta=1e-3, froude=0.02)
+
+    true, stated = {"rolling": 0.02, "sideways": 0.1}, wheeled(0.03, 0.13)
+    path = recorded(tmp_path / "a.csv", colloc.evaluate(wheeled(**true), GAIT))
+    for name, (value, error) in colloc.identify(stated, path).coefficients.items():
+        assert abs(value - true[name]) < 1.5 * error < 0.1 * true[name]
+
+
 def test_what_the_motion_does_not_tell_stays_as_stated_and_is_said(tmp_path):
     """A body that is driven tail first, on feet that hardly slip sideways, tells nothing of sliding
     forwards."""

@@ -176,13 +176,18 @@ def test_feet_that_have_to_be_alike_move_together():
     [
         (colloc.Foot(1), [f"friction {way}" for way in WAYS]),
         (colloc.Wheel(1, rolling=0.1), [f"friction {way} of foot 2" for way in WAYS]),
+        (
+            colloc.Wheel(1, axle=True),
+            ["rolling resistance of foot 2", "slip resistance of foot 2"],
+        ),
     ],
 )
 def test_wheels_have_numbers_of_their_own(middle, others):
     body = colloc.Chain(feet=(colloc.Wheel(0, rolling=0.05), middle, colloc.Wheel(2, rolling=0.05)))
     stated = {each.name: each for each in parameters(colloc.Problem("x", body=body))}
     own = [f"friction {way} of feet 1 and 3" for way in WAYS]
-    assert {name for name in stated if "friction" in name} == {*others, *own}
+    words = "friction", "resistance"
+    assert {x for x in stated if any(word in x for word in words)} == {*others, *own}
     changed = [foot.friction for foot in stated[own[1]].changed(0.2).body.feet]
     outer = colloc.Friction(mu_t=1, mu_f=0.06, mu_b=0.05)
     assert changed == [outer, body.feet[1].friction, outer]
@@ -210,6 +215,7 @@ def test_formulas_of_a_law_of_ones_own_are_no_numbers(stated):
         {"body": colloc.Chain(weights=(0.3, 0.3, 0.4), width=0.02), "grade": 0.1},
         {"body": colloc.Chain(feet=MIRRORED), "gait": colloc.Harmonic(1, "bilateral")},
         {"friction": colloc.PowerLaw(0.3), "gait": colloc.Harmonic(2)},
+        {"friction": colloc.Axle(rolling=0.03, sideways=0.7)},
         {"gait": colloc.Polygon(3)},
     ],
 )
