@@ -69,6 +69,8 @@ _MOST_STEPS = 30
 _OTHER = 1e-2  # momenta [body lengths per period] by which two motions differ that are not one
 _KINK, _NARROWEST = 1e-3, 1e-9
 """Least part of the cycle that a panel's error is held against, as kinks are few; least width."""
+_TOGETHER = 4
+"""Steps of a run in a panel: they are a few times shorter than quadrature of this order needs."""
 _END = np.ones(1)
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 _Breaks = np.ndarray | tuple[float, ...]
@@ -103,33 +105,34 @@ class _Gait:
         raise NotImplementedError
 
     def sums(self, ran: Course, aim: float, ends: np.ndarray = _END, motion: int = 0) -> np.ndarray:
-        """Quantities that need forces up to ascending phases, ``(k, n)``, by Gauss quadrature
-        between the steps of a run, which are halved where that changes more than an error, as at
-        kinks of a power."""
+        """Quantities that need forces up to ascending phases, ``(k, n)``, by Gauss quadrature over
+        a few steps of a run at a time, halved where that changes more than an error, as at kinks of
+        a power."""
         sums = np.zeros((len(self.quantities), ends.size + 1))
         if not self.quantities:
             return sums[:, 1:]
 
-        def gained(edges: np.ndarray, h: np.ndarray) -> np.ndarray:
-            t = (edges[:, None] + h[:, None] * PANEL_RULE.c).ravel()
+        def gained(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+            t = (left[:, None] + (right - left)[:, None] * PANEL_RULE.c).ravel()
             now = self.instants(t, ran.at(t)[7 * motion :])
-            densities = np.stack([each.at(now).reshape(h.size, -1) for each in self.quantities])
-            return np.asarray(h * (densities @ PANEL_RULE.b))
+            densities = np.stack([each.at(now).reshape(left.size, -1) for each in self.quantities])
+            return np.asarray((right - left) * (densities @ PANEL_RULE.b))
 
-        edges = np.union1d(np.union1d(ran.phases, ends), 0.0)
-        left, h = edges[:-1], np.diff(edges)
-        whole = gained(left, h)
+        edges = np.union1d(np.union1d(ran.phases[::_TOGETHER], ends), 0.0)
+        left, right = edges[:-1], edges[1:]
+        whole = gained(left, right)
         while left.size:
-            left, h = (left[:, None] + h[:, None] * [0.0, 0.5]).ravel(), np.repeat(0.5 * h, 2)
-            parts = gained(left, h)
+            middle = 0.5 * (left + right)
+            each = np.column_stack([left, middle]).ravel(), np.column_stack([middle, right]).ravel()
+            parts = gained(*each)
             both = parts[:, ::2] + parts[:, 1::2]
-            off = np.abs(both - whole).max(axis=0) > aim * np.maximum(2 * h[::2], _KINK)
-            off &= h[::2] > _NARROWEST
-            upto = np.searchsorted(ends, left[::2], side="right")
+            off = np.abs(both - whole).max(axis=0) > aim * np.maximum(right - left, _KINK)
+            off &= right - left > 2 * _NARROWEST
+            upto = np.searchsorted(ends, left, side="right")
             for row, part in zip(sums, both, strict=True):
                 np.add.at(row, upto[~off], part[~off])
             again = np.repeat(off, 2)
-            left, h, whole = left[again], h[again], parts[:, again]
+            (left, right), whole = (edge[again] for edge in each), parts[:, again]
         return np.cumsum(sums, axis=1)[:, :-1]
 
     def measured(
