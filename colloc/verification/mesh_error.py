@@ -11,7 +11,7 @@ where links begin to stick or slip, intervals with the largest errors are *split
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -438,17 +438,23 @@ def plan_mesh(
         more = [rules[0].s + n for n in _MORE_NODES]
         rules += [scheme(f"{match[1]}-{s}") for s in more[1:] if s <= _MOST_NODES]
     asked: Any = {"kept": knots, "tolerance": tolerance, "aim": aim}
+    best: MeshPlan | None = None
+
+    def budget() -> float:
+        return most_points if best is None else min(most_points, best.points / _HANDICAP)
+
     if control.dynamics.followed:
         uniform = np.linspace(0.0, control.admissible.fraction, control.intervals + 1)
         first = np.union1d(mesh.edges if nested else uniform, knots)
-        return _fewest(_halve(known, rule, first, budget=most_points, **asked) for rule in rules)
+        for rule in rules:
+            best = _fewest(best, _halve(known, rule, first, budget=budget(), **asked))
+        return best
     apart = _ONE_KINK * control.admissible.fraction
     kinks = kink_phases(control.dynamics.body, control.dynamics.law, gait, delta, fine, apart)
     # where the rates jump edges may be added, not moved
     keeps = nested or gaits.relative_delta or not gaits.free
     n = max(int(_COARSE * gaits.fraction), _A_HARMONIC * gaits.harmonics)
     coarse = mesh.edges if keeps else np.linspace(mesh.edges[0], mesh.edges[-1], n + 1)
-    best: MeshPlan | None = None
     for rule in rules:
         # a node right on the instant at which mu_b takes over from mu_f makes the efficiency itself
         # kinked
@@ -461,19 +467,14 @@ def plan_mesh(
             just_left = np.abs(nearest - kinks) < _LEFT * np.diff(mesh.edges).mean()
             targets = np.union1d(kinks, nearest[just_left])
         edges = move_knots(np.union1d(coarse, knots), targets, 0.0 if keeps else _SNAP)
-        budget = most_points if best is None else min(most_points, best.points / _HANDICAP)
-        plan = _split(known, rule, edges, on_knots, budget=budget, **asked)
-        best = plan if best is None else _fewest([best, plan])
+        best = _fewest(best, _split(known, rule, edges, on_knots, budget=budget(), **asked))
     return best
 
 
-def _fewest(plans: Iterable[MeshPlan]) -> MeshPlan:
+def _fewest(best: MeshPlan | None, plan: MeshPlan) -> MeshPlan:
     """The plan with the fewest points of those that reach the request; else the first."""
-    best, *others = plans
-    for plan in others:
-        if plan.reached and (not best.reached or plan.points * _HANDICAP < best.points):
-            best = plan
-    return best
+    fewer = best is None or not best.reached or plan.points * _HANDICAP < best.points
+    return plan if best is None or (plan.reached and fewer) else best
 
 
 def _by_error(shares: np.ndarray, allowed: float) -> tuple[np.ndarray, int]:
