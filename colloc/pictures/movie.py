@@ -209,8 +209,13 @@ def pictures(
         top = 0.93 if alone else 1 - 0.028 * width / height
         clock = figure.text(right, top, "", fontsize=10 * small, color=GREY, ha="right")
         if planar:
-            plane = figure.add_axes((0.77, 0.2, 0.22, 0.62))
+            plane = figure.add_axes((0.77, 0.2, 0.2, 0.62))
             draw_shape_path(plane, solution)
+            plane.tick_params(labelsize=8 * small)
+            for axis in (plane.xaxis, plane.yaxis):
+                axis.label.set_size(8 * small)
+                for text in axis.get_ticklabels()[1::2]:  # a narrow film has no room for all
+                    text.set_visible(False)
             (dot,) = plane.plot([], [], "o", color=VERMILION, mec="white", ms=8, zorder=5)
         for number in range(periods * count):
             for scene in scenes:
