@@ -213,7 +213,7 @@ def pictures(
             draw_shape_path(plane, solution)
             plane.tick_params(labelsize=8 * small)
             for axis in (plane.xaxis, plane.yaxis):
-                axis.label.set_size(8 * small)
+                axis.label.set_fontsize(8 * small)
                 for text in axis.get_ticklabels()[1::2]:  # a narrow film has no room for all
                     text.set_visible(False)
             (dot,) = plane.plot([], [], "o", color=VERMILION, mec="white", ms=8, zorder=5)
