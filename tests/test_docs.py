@@ -231,7 +231,7 @@ def test_the_table_of_classes_is_that_of_the_curated_tables():
 
 RUN_ELSEWHERE = {"own_body.md", "own_gait_class.md"}
 """Pages that `tests/test_own_parts.py` runs."""
-LONG = {"scripts.md", "slopes.md"}
+LONG = {"scripts.md", "slopes.md", "report.md", "robot.md", "motors.md"}
 WITH_PYTHON = [page for page in PAGES if blocks(page, "python") and page.name not in RUN_ELSEWHERE]
 RUN = [
     pytest.param(page, id=page.stem, marks=[pytest.mark.slow] * (page.name in LONG))

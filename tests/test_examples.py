@@ -28,6 +28,7 @@ def replayed(gait, delta):
     return colloc.replay(colloc.Chain(), colloc.Friction(), path, delta).efficiency
 
 
+@pytest.mark.slow
 def test_the_literal_program_has_the_efficiency_of_a_replay_while_delta_is_large(examples):
     page, _ = examples
     ((delta, efficiency, gait, _, status),) = page.follow(page.literal, deltas=(0.1,))

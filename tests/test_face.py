@@ -23,6 +23,7 @@ WITH_EXAMPLES = [
     for path in sorted((ROOT / "colloc").glob("*/*.py"))
     if ">>> " in path.read_text(encoding="utf-8")
 ]
+LONG = ("studies.solve", "studies.families", "search.identify", "verification.differential_motion")
 QUICK = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
 
 
@@ -59,7 +60,13 @@ def test_every_public_name_has_an_example_that_is_run(name):
     assert colloc._HOME[name] in WITH_EXAMPLES
 
 
-@pytest.mark.parametrize("module", WITH_EXAMPLES)
+@pytest.mark.parametrize(
+    "module",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name.removeprefix("colloc.") in LONG))
+        for name in WITH_EXAMPLES
+    ],
+)
 def test_the_examples_of_the_docstrings_run(module, monkeypatch):
     monkeypatch.chdir(ROOT)
     code = importlib.import_module(module)
@@ -169,6 +176,7 @@ def test_progress_is_told_and_printed_only_if_asked(capsys):
     assert printed[4].startswith("explore, 4 of 4; best d/W = 0.02")
 
 
+@pytest.mark.slow
 def test_an_archive_is_gone_on_with_and_its_starts_are_opened(tmp_path, capsys):
     path, again = tmp_path / "quick.starts.h5", []
     first = colloc.multistart(QUICK, 2, archive=path)

@@ -14,6 +14,7 @@ from colloc.gaits import gait_fields
 from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import DRIVEN_WORK
+from tests.shared.cases import slow
 
 DOCS = Path(__file__).resolve().parents[1] / "docs/howto"
 
@@ -75,7 +76,7 @@ def test_a_class_of_your_own_is_searched_certified_kept_and_read(monkeypatch, tm
 
 def test_a_class_that_is_no_fourier_series_is_one_file_too(monkeypatch, tmp_path):
     own = run("own_gait_class.md", monkeypatch)
-    found = solve(Problem("pulses", gait=own.Pulses(6, symmetry="antipodal")), starts=3)
+    found = solve(Problem("pulses", gait=own.Pulses(6, symmetry="antipodal"), **COARSELY), starts=1)
     assert found.status == "solved", found.message
     read = load(save(found, tmp_path / "pulses.h5"))
     assert (type(read.problem.gait), read.problem.hash) == (own.Pulses, found.problem.hash)
@@ -114,12 +115,12 @@ def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "gait", [Harmonic(1, "bilateral"), colloc.Polygon(3, "bilateral")], ids=["series", "path"]
+    "gait", [Harmonic(1, "bilateral"), slow(colloc.Polygon(3, "bilateral"))], ids=["series", "path"]
 )
 def test_a_quantity_stated_anew_is_the_one_that_is_known(gait):
     mine = Objective("distance / mine", quantities=[Quantity("mine", DRIVEN_WORK.density)])
     known = Problem(
-        "known", ellipse(0.0, 2.8, 1.3), gait=gait, objective="driven efficiency", delta=1e-3
+        "known", ellipse(0.0, 2.8, 1.3), gait=gait, objective="driven efficiency", **COARSELY
     )
     first, second = (solve(each, starts=1) for each in (known, known.with_(objective=mine)))
     assert second.status == first.status == "solved"
@@ -142,6 +143,7 @@ def test_what_a_quantity_is_proportional_to_follows_from_its_formula():
     assert Objective("distance / mixed", quantities=[mixed]).degree is None
 
 
+COARSELY = {"delta": 1e-2}
 WEAK = Problem(
     "weak", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), torque_limit=0.053, delta=1e-2
 )

@@ -17,7 +17,7 @@ from colloc.commands.main import main as colloc_main
 
 ROWS = known()
 PAGE = Path(__file__).parents[1] / "docs" / "known.md"
-QUICK = ("three_link", "two_link", "three_link_uphill", "three_link_fast")
+QUICK = ("three_link", "two_link", "three_link_fast")
 CASES = [
     pytest.param(row, id=name, marks=[pytest.mark.slow] * (name not in QUICK))
     for row in ROWS
@@ -61,6 +61,7 @@ def test_a_gait_that_breaks_a_limit_is_not_accepted(best):
         with_row([], false)
 
 
+@pytest.mark.slow
 def test_only_what_is_better_takes_the_place_of_a_rival(best):
     good = row_of(best, "colloc solve quick.py")
     wide = PROBLEM.with_(gait=colloc.Harmonic(2, "bilateral"), guess=best.gait)
@@ -96,6 +97,7 @@ def test_the_referee_takes_a_result_and_holds_it(best, tmp_path, capsys):
         known(tmp_path / "none.json")
 
 
+@pytest.mark.slow
 def test_without_a_table_the_referee_begins_a_copy_of_its_own_where_it_is_called(
     best, tmp_path, monkeypatch
 ):
@@ -132,6 +134,7 @@ def test_two_that_are_taken_in_at_once_are_both_there(best, tmp_path, monkeypatc
     assert {row.statement["name"] for row in known(table)} == {"quick", "other"}
 
 
+@pytest.mark.slow
 def test_bounds_under_dry_friction_are_saved_and_checked_again(best, tmp_path, capsys):
     result, table = tmp_path / "quick.h5", tmp_path / "known.json"
     solution = colloc.load(colloc.save(best, result))

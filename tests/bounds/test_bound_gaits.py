@@ -10,6 +10,7 @@ from colloc import Chain, Friction
 from colloc.bounds.motions import CoulombMotion, admissible
 from colloc.bounds.potential import Samples
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
+from research import small_gaits
 from research.guarantee.potential_range import potential_space
 from research.small_gaits import balanced_motion, best_small_gait, small_gait
 from tests.shared.laws import coulomb
@@ -169,3 +170,43 @@ def test_the_best_small_gait_is_found_along_a_ridge_that_no_axis_follows():
     best, shape = best_small_gait(Chain(), Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0), 2.5)
     assert best.efficiency > 0.208
     assert shape[0] == pytest.approx(-shape[1], abs=5e-3)
+
+
+FOLDED = [(0, 10, 0, 0), (5, -11, -12, 132 / 7), (-1, 1, 12, -132 / 7)]
+"""The best small gait known at the fold: a, w1, w2, w3 of three motions, each for the same time, of
+a body whose first link lies on its second. In units of a link all velocities are lateral: a + w1 xi,
+a + w2 xi and a + w2 + w3 xi at xi of [0, 1] along the links, away from the first joint."""
+EXACT = 462 / 1013
+"""What these do for their work, in rational arithmetic: 4 units forwards, of a work of 2026/77."""
+
+
+def test_the_best_gait_known_at_the_fold_is_in_balance_closes_and_is_worth_462_over_1013():
+    said, joints = [], []
+    for a, w1, w2, w3 in FOLDED:
+        joints.append([w1 - w2, w2 - w3])
+        z, rates = np.array([[0.0], [(a + w1) / 3], [-w1]]), np.array(joints[-1])[:, None]
+        at = np.array([[np.pi], [0.0]]), rates, z, np.full((1, 1), 1e-12)
+        said.append(Chain().sliding(Friction(), *at))
+    np.testing.assert_allclose(np.sum(joints, axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose([9 * each.power.item() for each in said], [5, 838 / 77, 73 / 7])
+    # the second link, at rest beneath the first, holds that with the whole of its friction
+    np.testing.assert_allclose(said[0].force[:, 0], [0.0, -1 / 3, -1 / 18], atol=1e-3)
+    np.testing.assert_allclose([each.force[:, 0] for each in said[1:]], 0.0, atol=1e-11)
+    work = sum(each.power.item() for each in said)
+    assert sum(each.centre[1, 0] for each in said) / work == pytest.approx(EXACT, rel=1e-9)
+
+
+def missing(monkeypatch, delta):
+    """How much less than the exact value the linear program finds at a finite regularisation."""
+    monkeypatch.setattr(small_gaits, "_DELTA", delta)
+    return EXACT - small_gait(Chain(), Friction(), np.array([np.pi, 0.0])).efficiency
+
+
+def test_the_linear_program_over_directions_finds_the_same_value(monkeypatch):
+    assert 0 < missing(monkeypatch, 1e-6) < 2e-5
+
+
+@pytest.mark.slow
+def test_what_it_misses_is_the_creep_of_regularised_friction(monkeypatch):
+    coarse, fine = (missing(monkeypatch, delta) for delta in (1e-5, 1e-8))
+    assert np.log10(coarse / fine) / 3 == pytest.approx(1.0, abs=0.03)  # first order in delta

@@ -11,12 +11,7 @@ from scipy.optimize import linprog
 
 import colloc
 from colloc import Chain, Foot, Friction, Harmonic, ModalBody, Problem, ProblemError, solve_balance
-from colloc.bounds.motions import (
-    CoulombMotion,
-    Domain,
-    fundamental,
-    two_resting,
-)
+from colloc.bounds.motions import CoulombMotion, Domain, fundamental, two_resting
 from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline, largest_gain
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, smallest_maximum

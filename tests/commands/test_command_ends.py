@@ -28,6 +28,7 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.results.kept import save_result
 from colloc.search.checkpoint import Run
 from colloc.system.row_file import CACHE, put_rows
+from tests.shared.cases import slow
 
 QUICK = """
 from colloc import *
@@ -169,7 +170,7 @@ def test_a_figure_that_cannot_be_drawn_costs_no_summary(solve, tmp_path):
     assert "no figure: cannot write" in complaint
 
 
-@pytest.mark.parametrize("words", [[], ["--json"]])
+@pytest.mark.parametrize("words", [[], slow(["--json"])])
 def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(
     words, solve, tmp_path, monkeypatch
 ):
@@ -327,6 +328,7 @@ def shell(line, folder):
     return done.returncode, done.stdout, done.stderr
 
 
+@pytest.mark.slow
 @needs_bash
 def test_closed_streams_change_nothing_but_what_is_printed(quick, tmp_path):
     line = f"colloc solve {quick} --no-figure --output {tmp_path}/ <&- >&- 2>&-"
@@ -346,6 +348,7 @@ def test_a_pipe_that_is_closed_early_is_one_sentence_and_a_code_of_its_own(resul
     )
 
 
+@pytest.mark.slow
 def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_path):
     """An installation without a compiler has no extension module; other sources, so that what is
     installed beside is not taken for it."""

@@ -12,7 +12,7 @@ from colloc.gaits.problem_file import read_problem_file
 from scripts.gallery import FILES, PICTURES, TABLE, solution_of, solved_row
 
 NUMBERS = json.loads(TABLE.read_text())
-SLOW = 4.0
+SLOW = 1.3
 """Files that took longer [s of processor time], or whose time is not known, are left to the slow
 tests."""
 SCRIPTS = {file.stem for file in FILES if "__main__" in file.read_text(encoding="utf-8")}

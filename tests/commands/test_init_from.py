@@ -15,6 +15,7 @@ from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Wheel
 from colloc.commands.ending import BAD_PROBLEM, OK
 from colloc.commands.solve import init as main
 from colloc.gaits.problem_file import read_problem_file
+from tests.shared.cases import slow_but
 
 # of a worm of three segments whose second axis points down
 LINKS = {"tail": (0.12, 0.05), "mid": (0.20, 0.06), "head": (0.28, 0.05)}
@@ -135,18 +136,25 @@ def feet(body):
     ]
 
 
-@pytest.mark.parametrize("kind", ["urdf", "xml"])
+THERE = {
+    "strips": Chain((0.2, 0.3, 0.3, 0.2), width=0.02),
+    "weights": Chain((0.25, 0.35, 0.4), weights=(0.3, 0.3, 0.4), feet=1),
+    "feet": Chain((0.25, 0.35, 0.4), feet=(Foot(0, 0.2), Foot(1), Foot(2, 0.9))),
+}
+
+
 @pytest.mark.parametrize(
-    "body",
-    [
-        Chain((0.2, 0.3, 0.3, 0.2), width=0.02),
-        Chain((0.25, 0.35, 0.4), weights=(0.3, 0.3, 0.4), feet=1),
-        Chain((0.25, 0.35, 0.4), feet=(Foot(0, 0.2), Foot(1), Foot(2, 0.9))),
-    ],
+    ("kind", "body"),
+    slow_but(
+        [("urdf", "strips"), ("xml", "weights"), ("urdf", "feet")],
+        [(kind, body) for kind in ("urdf", "xml") for body in THERE],
+    ),
 )
 def test_a_model_that_colloc_writes_is_read_as_the_same_body(kind, body, tmp_path):
+    body = THERE[body]
     limits = ((-1.0, 1.4), *(1.1, 1.2)[: body.n_joint - 1])
-    problem = Problem("there", body=body, friction=Friction(0.5, 0.5, 0.5), joint_limit=limits)
+    at = {"friction": Friction(0.5, 0.5, 0.5), "delta": 0.1, "mesh_tolerance": 1e-2}
+    problem = Problem("there", body=body, joint_limit=limits, **at)
     n = body.n_joint
     gait = colloc.Fourier(np.zeros(n), 0.6 * np.eye(n)[:, :1], 0.6 * np.eye(n)[:, 1:2])
     solution = colloc.evaluate(problem.with_(gait=Harmonic(1, "none")), gait)

@@ -78,6 +78,7 @@ def test_nor_does_a_figure(without, environment, place):
     solved_and_verified(place, [], without, environment)
 
 
+@pytest.mark.slow
 def test_text_files_are_utf_8_whatever_the_language(place, three_link):
     result = save(three_link, place / "Länge.h5")
     for words, name in (

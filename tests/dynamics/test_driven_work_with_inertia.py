@@ -9,6 +9,7 @@ import colloc
 from colloc.gaits.regime import Regime
 from colloc.reduced.program import ReducedProgram
 from colloc.search.iterate import space_near
+from tests.shared.cases import slow_but
 from tests.shared.inertia import played as with_inertia
 
 GAIT = colloc.Fourier([0.3, -0.2], cos=[[0.6, 0.1], [0.3, 0.2]], sin=[[0.2, 0.3], [0.7, -0.1]])
@@ -84,6 +85,7 @@ def test_joints_do_the_work_of_friction_and_climb(grade):
     assert played.values["all_power"] == pytest.approx(played.work, rel=3e-7)
 
 
+@pytest.mark.slow
 def test_slow_motion_is_the_limit():
     """The difference falls like the Froude number."""
     slow = colloc.replay(CHAIN, FLOOR, GAIT, DELTA, objective=DRIVEN)
@@ -94,7 +96,7 @@ def test_slow_motion_is_the_limit():
     assert 1e-2 > off[0] > 3 * off[1] > 0
 
 
-@pytest.mark.parametrize("seed", [0, 2, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 3))])
+@pytest.mark.parametrize("seed", slow_but([0], range(4)))
 def test_stated_errors_cover_the_true_ones(seed):
     rng = np.random.default_rng(seed)
     mean, series = 0.4 * rng.normal(size=2), rng.normal(size=(2, 2, 2)) * [0.9, 0.3]
@@ -134,6 +136,7 @@ def test_a_gait_of_least_driven_work_is_certified_and_beats_that_of_least_work()
     assert found.value > 1.001 * again.value
 
 
+@pytest.mark.slow
 def test_a_pace_is_best_where_time_and_energy_are_worth_the_same():
     """A period more or less of a free pace costs as much, and the range does not bind."""
     stated = {"body": colloc.Chain(), "friction": colloc.Friction(), "guess": None}

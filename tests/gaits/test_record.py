@@ -188,6 +188,7 @@ def test_slow_noise_does_not_hide_a_period(tmp_path):
     assert found.period == pytest.approx(1, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_long_log_is_read_in_seconds(tmp_path):
     t = np.arange(20_000) / 400
     begin = time.process_time()

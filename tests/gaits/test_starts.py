@@ -143,6 +143,7 @@ def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class
         np.testing.assert_allclose(laid.angles(PHASES), -laid.angles(-PHASES)[::-1], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_richer_class_keeps_what_its_seed_had():
     """From 100 times the final delta, where friction is regularised most, the search leaves this
     optimum: 0.3998."""
@@ -158,6 +159,7 @@ def test_a_richer_class_keeps_what_its_seed_had():
     assert solution.certificate.efficiency > 0.4010
 
 
+@pytest.mark.slow
 def test_a_hexagon_is_an_octagon_with_corners_on_its_sides():
     hexagon = Corners(
         np.array([[2.58068, 3.11378, 2.97774, 2.81594], [-2.58068, -2.58089, -2.67289, -2.81594]]),

@@ -118,10 +118,10 @@ def test_what_no_robot_is_gets_a_sentence(wrong, words):
 
 
 @pytest.fixture(scope="module")
-def slow_robot():
+def slow_robot(once):
     body = Chain((0.2, 0.3, 0.3, 0.2))
     problem = Problem("slow", body=body, gait=Harmonic(1, "antipodal"), robot=SLOW, delta=1e-2)
-    return colloc.solve(problem, starts=2)
+    return once("slow robot", lambda: colloc.solve(problem, starts=1))
 
 
 def whoever_speaks_of_it_says_the_same(found, tmp_path):
@@ -206,9 +206,11 @@ def test_a_period_that_is_sought_keeps_the_speed_of_the_motors(tmp_path):
     assert again.value == pytest.approx(solution.value, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_film_of_a_robot_takes_its_time(tmp_path):
     robot = replace(SLOW, period=1.5, max_speed=None)
-    problem = Problem("quick", gait=Harmonic(1, "antipodal"), robot=robot, delta=1e-2)
+    at = {"robot": robot, "delta": 0.1, "mesh_tolerance": 1e-2}
+    problem = Problem("quick", gait=Harmonic(1, "antipodal"), **at)
     solution = colloc.evaluate(problem, colloc.ellipse(0.0, 1.5, 1.0))
     path = solution.animate(tmp_path / "a.gif", periods=1, fps=10, width=200)
     with Image.open(path) as film:

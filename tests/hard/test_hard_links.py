@@ -16,6 +16,7 @@ def column(*values):
     return [np.array([[v]]) for v in values]
 
 
+@pytest.mark.slow
 def test_the_reference_agrees_with_quadrature():
     for arguments in ((1e-7, -0.01, 2.0, 1e-6), (2.0, 0.1, 0.0, 1e-2)):
         vs, vn, w, delta = arguments

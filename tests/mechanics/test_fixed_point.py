@@ -1,5 +1,5 @@
 """The balance solver: its methods, starts and folds that are hard, and outside forces at the centre
-of mass; its invariances are in tests/hard/test_properties.py."""
+of mass; its invariances are in tests/hard/test_properties.py and test_chain_mechanics.py."""
 
 import numpy as np
 import pytest

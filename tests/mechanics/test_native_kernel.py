@@ -139,5 +139,6 @@ for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
 
 
 @needs_kernel
+@pytest.mark.slow
 def test_it_reads_and_writes_nothing_beyond_its_arrays():
     stays_within_its_arrays(WITHIN_ITS_ARRAYS)

@@ -64,6 +64,7 @@ def test_dips_of_the_third_slowest_end():
     assert speed[0] <= 0.02
 
 
+@pytest.mark.slow
 def test_command_line_computes_resumes_and_draws(tmp_path, capsys):
     """Two small parts: computed, then skipped, drawn; the rest named as missing."""
     arguments = ["--quick", "--only", "instant", "flap", "--processes", "1"]

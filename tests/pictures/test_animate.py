@@ -129,6 +129,7 @@ def test_without_ffmpeg_an_mp4_is_refused_before_anything_is_drawn(
     assert {path.name for path in tmp_path.iterdir()} == {"x.h5"}
 
 
+@pytest.mark.slow
 def test_publication_figures_are_pdf_and_png_of_journal_width(three_link, tmp_path):
     written = save_panels(three_link, tmp_path / "x")
     names = {path.name for path in written}

@@ -1,19 +1,26 @@
-"""The figure of a solution can be read: no words over words, nothing cut off."""
+"""The figure of a solution can be read, no words over words, nothing cut off, and is drawn whatever
+backend and style the surroundings name, which it leaves as they are."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from itertools import pairwise
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from shared.readable import assert_readable
 
-from colloc import Chain, Foot, Fourier, Friction, Harmonic, ModalBody, Pad, Problem, Wheel
+from colloc import Chain, Foot, Fourier, Friction, Harmonic, ModalBody, Pad, Problem, Wheel, save
 from colloc.gaits.limits import under_one_limit
 from colloc.mechanics.contact import crossing_depth
 from colloc.pictures.figure import draw_filmstrip, draw_lab, forbidden, panels
+from colloc.pictures.style import save as save_figure
 from colloc.results.motion import foot_kinds
+from tests.shared.cases import slow, slow_but
 
 
 def crawler(n_link, size=0.6):
@@ -39,7 +46,10 @@ def bodies(axes):
 
 @pytest.mark.parametrize(
     ("n_link", "size"),
-    [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (6, 0.5), (9, 0.3), (13, 0.2)],
+    slow_but(
+        [(2, 1.5), (4, 0.6), (9, 0.3)],
+        [(2, 0.1), (2, 1.5), (3, 0.3), (4, 0.6), (5, 0.6), (6, 0.5), (9, 0.3), (13, 0.2)],
+    ),
 )
 def test_no_words_over_words_and_nothing_cut_off(n_link, size, unsolved):
     solution = unsolved(crawler(n_link, size))
@@ -49,7 +59,7 @@ def test_no_words_over_words_and_nothing_cut_off(n_link, size, unsolved):
     assert joints <= set(texts)
 
 
-@pytest.mark.parametrize("n_link", [6, 13])
+@pytest.mark.parametrize("n_link", [6, slow(13)])
 def test_joints_of_a_robot_are_named_above_the_panels_in_colours_that_differ(n_link, unsolved):
     solution = unsolved(crawler(n_link, 0.3))
     figure = solution.robot(length=1.0, mass=1.0, period=4.0).plot()
@@ -179,3 +189,53 @@ def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
     column, row = (np.abs(grid[:, None] - allowed[j]).argmin(axis=0) for j in plane)
     # no deeper than the nearest point of the grid may be
     assert excess[row, column].max() < 2.5 * (grid[1] - grid[0])
+
+
+COMMANDS = (
+    slow("report one.h5"),
+    slow("animate one.h5 --periods 1 --seconds 0.2 --width 200"),
+)
+
+
+def python(*words, folder=None, **environment):
+    how = {"capture_output": True, "text": True, "env": os.environ | environment, "cwd": folder}
+    done = subprocess.run([sys.executable, *words], **how)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_commands_draw_where_the_environment_names_a_backend_that_there_is_not(
+    command, three_link, tmp_path
+):
+    """A notebook's terminal does: module://matplotlib_inline.backend_inline."""
+    save(three_link, tmp_path / "one.h5")
+    python("-m", "colloc", *command.split(), folder=tmp_path, MPLBACKEND="no_such_name")
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("before", "backend"),
+    [("", "module://no.such_name"), slow(("matplotlib, ", "svg"))],
+)
+def test_a_script_draws_whatever_backend_is_named_and_one_that_there_is_stays(
+    before, backend, three_link, tmp_path
+):
+    save(three_link, tmp_path / "one.h5")
+    drawn = f"import os, {before}colloc; colloc.load('one.h5').plot().savefig('one.png')"
+    asked = "print(matplotlib.rcParams['backend'] == 'svg', os.environ['MPLBACKEND'])"
+    script = f"{drawn}; import matplotlib; {asked}"
+    said = python("-c", script, folder=tmp_path, MPLBACKEND=backend)
+    assert (tmp_path / "one.png").exists()
+    assert said == f"{backend == 'svg'} {backend}\n"
+
+
+def test_a_style_that_cannot_be_drawn_with_is_of_no_account_and_stays(three_link, tmp_path):
+    with matplotlib.rc_context(
+        {"text.usetex": True, "figure.figsize": (1.0, 1.0), "font.family": "no such font"}
+    ):
+        mine = dict(matplotlib.rcParams)
+        drawn = save_figure(three_link.plot(), tmp_path / "styled", ("png",))
+        assert dict(matplotlib.rcParams) == mine
+    usual = save_figure(three_link.plot(), tmp_path / "usual", ("png",))
+    assert drawn[0].read_bytes() == usual[0].read_bytes()

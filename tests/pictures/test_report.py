@@ -21,6 +21,7 @@ from colloc.search.certify import certify
 from colloc.search.evaluate import evaluate
 from colloc.verification.replay import replay
 from tests.pictures.test_figure import crawler
+from tests.shared.cases import slow_but
 
 BROWSER = next(
     (path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path),
@@ -151,7 +152,7 @@ def test_the_page_says_how_slow_is_slow_enough(page, three_link):
     assert 1 / (9.81 * period**2) == pytest.approx(part * froude, rel=0.15)  # of two digits
 
 
-@pytest.mark.parametrize("n_link", [2, 3, 5, 8])
+@pytest.mark.parametrize("n_link", slow_but([2, 3], [2, 3, 5, 8]))
 def test_chains_of_two_to_eight_links(n_link, unsolved):
     solution = unsolved(crawler(n_link))
     page = report_page(solution)
@@ -372,11 +373,14 @@ def test_sliders_of_the_page_say_and_draw_what_their_wave_does(page, three_link)
     assert said.strip().endswith("true")
 
 
-def test_only_chains_of_up_to_eight_links_on_their_bellies_get_sliders(page, unsolved):
+NO_SLIDERS = {
+    "nine": (Fourier(np.zeros(8), np.full((8, 1), 0.1), np.eye(8, 1)), Chain((1 / 9,) * 9)),
+    "feet": (ellipse(0.0, 1.0, 1.0), Chain((1 / 3,) * 3, feet=1), Friction(), Harmonic(1)),
+}
+
+
+@pytest.mark.parametrize("name", slow_but(["feet"], NO_SLIDERS))
+def test_only_chains_of_up_to_eight_links_on_their_bellies_get_sliders(name, page, unsolved):
     assert "Play with it" in page
-    nine = Problem(
-        "nine", Fourier(np.zeros(8), np.full((8, 1), 0.1), np.eye(8, 1)), Chain((1 / 9,) * 9)
-    )
-    feet = Problem("feet", ellipse(0.0, 1.0, 1.0), Chain((1 / 3,) * 3, feet=1), gait=Harmonic(1))
-    for other in (nine, feet):
-        assert "Play with it" not in report_page(unsolved(other))
+    problem = Problem(name, *NO_SLIDERS[name], intervals=8)
+    assert "Play with it" not in report_page(unsolved(problem))

@@ -18,6 +18,7 @@ from colloc import Chain, Concertina, Foot, Fourier, Friction, ModalBody, Pad, P
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.balance import solve_smooth
 from colloc.verification.trajectory import plan_trajectory
+from tests.shared.cases import slow_but
 from tests.shared.inertia import played as with_inertia
 from tests.shared.without_kernel import numpy_instead
 
@@ -143,7 +144,7 @@ def assert_same(name, found, known):
     np.testing.assert_allclose(found, known, rtol=precision, atol=1e-7)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", slow_but([name for name in CASES if name != "crawler"], CASES))
 def test_a_result_is_what_it_was(name):
     assert_same(name, CASES[name](), json.loads(KNOWN.read_text(encoding="utf-8"))[name])
 

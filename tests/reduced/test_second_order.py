@@ -1,11 +1,12 @@
-"""Second-order conditions: optima have positive curvature on what is free, a known saddle has not;
-and rows follow the worst instants of whatever gait they are asked for."""
+"""Second-order conditions: optima have positive curvature on what is free, a known saddle has not, and
+a search leaves it; rows follow the worst instants of whatever gait they are asked for, and a search
+on one mesh ends when they rest."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize_scalar, root
 
 from colloc import Chain, Friction, Harmonic, Problem, ellipse
 from colloc.gaits.starts import latin_hypercube_gait
@@ -13,10 +14,12 @@ from colloc.mechanics.densities import Instants
 from colloc.reduced.program import ReducedProgram
 from colloc.reduced.second_order import curvature
 from colloc.search import optimise as converge
-from colloc.search.iterate import space_near
-from colloc.search.optimise import solve_subproblems
+from colloc.search.confirm import confirm
+from colloc.search.iterate import evaluate_at, space_near
+from colloc.search.optimise import leave_saddle, solve_subproblems
 from colloc.search.options import FINE, OPTIONS
-from tests.shared.stages import answer_near
+from colloc.search.solve import finish, solve
+from tests.shared.stages import answer_near, optimum_near
 
 PROBLEM = Problem("bilateral", gait=Harmonic(1, "bilateral"), intervals=100)
 SADDLE = ellipse(0.0, 0.30734, 0.76781)
@@ -234,3 +237,74 @@ def test_a_gait_comes_to_rest_at_limits_that_it_touches_for_an_instant(follows, 
     space, v = space_near(problem, latin_hypercube_gait(problem, 0, 0))
     _, conditions, *_ = solve_subproblems(ReducedProgram(space, 0.02), v, FINE)
     assert (max(conditions.kkt_error, conditions.violation) < 1e-6) == follows
+
+
+USUAL = {"gait": Harmonic(1, "bilateral"), "guess": ellipse(0.0, 2.0, 1.0)}
+PLAIN = Problem("plain", intervals=60, mesh_tolerance=0, **USUAL)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return optimum_near(PLAIN.with_(intervals=40))
+
+
+@pytest.mark.parametrize(("beyond", "kept"), [(0.0, False), (1e-7, False), (1e-4, True)])
+def test_what_ipopt_finds_is_the_answer_only_where_its_checks_rest(
+    found, monkeypatch, beyond, kept
+):
+    """Up to what a certificate lets pass; else the gait of the search is, if it satisfies the
+    first-order conditions."""
+    place = ReducedProgram.place_rows
+    monkeypatch.setattr(
+        ReducedProgram, "place_rows", lambda program, v: (place(program, v), beyond)[1]
+    )
+    answer = confirm(found)
+    assert answer.optimal
+    assert ("beyond its limits" in answer.message) == kept
+    assert (answer.status == "stationary") == kept
+    assert abs(answer.value + found.objective) < OPTIONS.confirm_radius
+
+
+@pytest.mark.parametrize("changed", [{}, {"mu_b": 2.0}], ids=["symmetric", "unequal"])
+def test_a_solve_that_begins_at_its_answer_stays_there_at_one_delta(changed):
+    problem = Problem("again", friction=Friction(**changed), delta=1e-3, **USUAL)
+    found = solve(problem, 1)
+    again = solve(problem.with_(guess=found.gait), 1)
+    assert found.history[0].delta == problem.delta_start
+    assert {step.delta for step in again.history} == {problem.delta}
+    assert again.value == pytest.approx(found.value, rel=problem.mesh_tolerance)
+    assert again.success
+
+
+@pytest.fixture(scope="module")
+def saddle():
+    """Without an offset the gait is its own mirror image, and the gradient has no part that would
+    give it one."""
+    space, v = space_near(PLAIN, SADDLE)
+    v = root(ReducedProgram(space, PLAIN.delta).gradient, v, tol=1e-9).x
+    return evaluate_at(space, v, PLAIN.delta)
+
+
+def smallest(found):
+    return curvature(ReducedProgram(found.space, found.delta), found.v).smallest
+
+
+def test_below_a_saddle_lies_an_optimum(saddle):
+    assert saddle.optimal
+    assert saddle.objective == pytest.approx(-0.04614, abs=2e-5)
+    below = leave_saddle(saddle)
+    assert smallest(below) > 0
+    assert below.objective < 2 * saddle.objective
+
+
+def test_a_search_that_comes_to_a_saddle_goes_on_from_there(saddle):
+    assert confirm(saddle).second_order.smallest < 0
+    found = finish(PLAIN, saddle)
+    assert found.success
+    assert found.answer.second_order.smallest > 0
+    assert found.answer.value > -4 * saddle.objective
+    assert found.answer.history[0].value == pytest.approx(0.04614, abs=2e-5)
+
+
+def test_nothing_lies_below_an_optimum(found):
+    assert leave_saddle(found) is None

@@ -209,10 +209,12 @@ def test_the_replay_is_as_accurate_as_was_asked_for(three_link, tmp_path, capsys
     assert "NOT CERTIFIED" in capsys.readouterr().out
 
 
-LONG = [pytest.param(name, marks=pytest.mark.slow) for name in ("four_link", "five_link")]
+LONG = [
+    pytest.param(name, marks=pytest.mark.slow) for name in ("small_gaits", "four_link", "five_link")
+]
 
 
-@pytest.mark.parametrize("name", ["two_link", "three_link", "small_gaits", *LONG])
+@pytest.mark.parametrize("name", ["two_link", "three_link", *LONG])
 def test_errors_of_a_certificate_hold(solved, name):
     """Against replays to 1e-9 at delta and at a ten-thousandth of it."""
     solution = solved(name)[0]

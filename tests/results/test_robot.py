@@ -101,6 +101,7 @@ def hurried(three_link):
     return robot, three_link.robot(1.2, 3, robot.facts["shortest_period_s"]).facts
 
 
+@pytest.mark.slow
 def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(
     three_link, hurried, tmp_path
 ):
@@ -113,6 +114,7 @@ def test_the_shortest_period_is_one_at_which_a_joint_is_as_fast_as_it_may_be(
     assert facts["shortest_period_paced_by_speed_s"] < facts["shortest_period_s"]
 
 
+@pytest.mark.slow
 def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
     """As of the same gait collocated for that pace, and of one followed through time."""
     size = {"length": 1.0, "mass": 2.0, "period": 1.5}
@@ -132,6 +134,7 @@ def test_the_sheet_is_that_of_the_motion_with_inertia_at_its_pace(three_link):
     np.testing.assert_allclose(end, [played.distance, 0.0], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_as_they_allow(
     three_link, hurried
 ):
@@ -145,6 +148,7 @@ def test_motors_too_slow_for_the_pace_are_told_how_fast_the_robot_is_as_they_all
     assert "too short" not in str(three_link.robot(1.2, 3, 50, max_speed=[2, 3]))
 
 
+@pytest.mark.slow
 def test_weak_motors_are_told_whether_a_longer_period_helps(three_link):
     """At 5 s joints need 2.36 N m, slowly 1.96."""
     assert "Torque limits are met at this pace" in str(three_link.robot(**SIZE, max_torque=4))
@@ -269,6 +273,7 @@ def towards_left(once):
     return once("aside", lambda: solve(problem.with_(intervals=24, mesh_tolerance=1e-3), 1))
 
 
+@pytest.mark.slow
 def test_a_gait_goes_the_way_it_is_asked_to_on_a_slope_and_its_distance_is_that_way(towards_left):
     assert towards_left.success, towards_left.message
     motion = towards_left.sample(np.array([0.0, 1.0]))

@@ -11,6 +11,7 @@ from colloc.commands.results import export as main
 from colloc.mechanics.inertia import kinetic_energy
 from colloc.pictures.export import mjcf, urdf
 from colloc.results.solution import direction_of_travel
+from tests.shared.cases import slow
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
 UNEVEN, MASSES, INERTIAS = (0.2, 0.5, 0.3), (0.3, 0.2, 0.5), (0.002, 0.006, 0.001)
@@ -142,13 +143,11 @@ PADS = tuple(Pad(link, 0.25, 0.75) for link in range(3))
     ("body", "mu_t", "gait"),
     [
         (Chain(UNEVEN, masses=MASSES), 1, (0.2, 1.0, 0.9)),
-        (Chain(feet=1), 1, (0.0, 1.6, 1.1)),
-        (Chain(UNEVEN, feet=WHEELS, masses=MASSES), 1, (0.0, 0.8, 0.6)),
-        (Chain(feet=TURNED), 1, (0.1, 0.8, 0.6)),
-        pytest.param(
-            Chain(UNEVEN, feet=AXLES, masses=MASSES), 1, (0.0, 0.8, 0.6), marks=pytest.mark.slow
-        ),
-        pytest.param(Chain(feet=PADS), 2, (0.0, 1.6, 1.1), marks=pytest.mark.slow),
+        slow((Chain(feet=1), 1, (0.0, 1.6, 1.1))),
+        slow((Chain(UNEVEN, feet=WHEELS, masses=MASSES), 1, (0.0, 0.8, 0.6))),
+        slow((Chain(feet=TURNED), 1, (0.1, 0.8, 0.6))),
+        slow((Chain(UNEVEN, feet=AXLES, masses=MASSES), 1, (0.0, 0.8, 0.6))),
+        slow((Chain(feet=PADS), 2, (0.0, 1.6, 1.1))),
     ],
     ids=["lying", "feet", "wheels", "turned wheels", "axles", "pads"],
 )

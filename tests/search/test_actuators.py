@@ -13,7 +13,7 @@ from colloc.dynamics.chain import joint_torques, torque_function
 from colloc.mechanics.balance import instant, joint_moments, largest_moments
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 from colloc.mechanics.friction import LinkVelocity
-from colloc.mechanics.inertia import inertial_moments, kinetic_energy, momentum_rates, tail_velocity
+from colloc.mechanics.inertia import inertial_moments
 from colloc.results.limit_use import lines
 from colloc.results.robot import joint_torques as sheet_torques
 from colloc.search.options import OPTIONS
@@ -218,10 +218,8 @@ HOPELESS = {
 }
 
 
-@pytest.mark.parametrize(
-    "case",
-    [case if case == "power" else pytest.param(case, marks=pytest.mark.slow) for case in HOPELESS],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("case", HOPELESS)
 def test_where_no_start_keeps_the_limits_the_search_ends_soon_and_says_what_is_missed(case):
     (changes, words), tried = HOPELESS[case], []
     stated = USUAL.with_(guess=None, delta=1e-2, **changes)
@@ -270,31 +268,6 @@ def directions(angles):
     """Cosines and sines of the links' directions from that of the tail link."""
     turns = np.cumsum(np.vstack([np.zeros(angles.shape[1]), angles]), axis=0)
     return np.cos(turns), np.sin(turns)
-
-
-def test_joints_do_the_work_of_friction_and_what_the_kinetic_energy_grows_by():
-    """Power balance, whatever the momenta: M . r = dissipation + Fr dT/dt."""
-    t, momenta, h = np.linspace(0.03, 0.9, 7), states(7), 1e-5
-    angles, rates = GAIT(t)
-    at = {"delta": DELTA, "froude": FROUDE}
-    now = momentum_rates(CHAIN, FLOOR, angles, rates, momenta, **at)
-
-    def energy(by):
-        (q, r), then = GAIT(t + by), momenta + by * now.rates
-        return kinetic_energy(CHAIN, q, r, tail_velocity(CHAIN, q, r, then))[0]
-
-    growth = (energy(h) - energy(-h)) / (2 * h)
-    torques = joint_torques(CHAIN, FLOOR, GAIT, t, momenta, **at)
-    np.testing.assert_allclose(
-        (torques * rates).sum(axis=0), now.power[0] + FROUDE * growth, atol=1e-6
-    )
-
-
-def limited(**changes):
-    stated = {"body": CHAIN, "gait": Harmonic(2), "delta": 1e-2, "intervals": 20}
-    return Problem(
-        "limited", friction=FLOOR, **({"torque_limit": 0.05, "froude": 0.2} | stated | changes)
-    )
 
 
 def test_a_gait_whose_motors_limit_it_is_certified_and_uses_all_that_it_may():

@@ -188,7 +188,7 @@ def exact():
     return colloc.evaluate(QUICK, GAIT)
 
 
-@pytest.mark.parametrize("degrees", [0.1, 1.0])
+@pytest.mark.parametrize("degrees", [pytest.param(0.1, marks=pytest.mark.slow), 1.0])
 def test_stated_errors_hold_for_gaits_through_noisy_samples_and_grow_with_the_noise(exact, degrees):
     rng, off = np.random.default_rng(3), []
     for _ in range(10):

@@ -19,6 +19,7 @@ from colloc.search.checkpoint import Run
 from colloc.search.explore import multistart
 from colloc.search.small_starts import small_loops
 from colloc.search.solve import solve
+from tests.shared.cases import slow
 
 UNEQUAL = Problem(
     "unequal", None, Chain((0.3, 0.2, 0.15, 0.35)), Friction(mu_t=2, mu_f=1, mu_b=1.4), Harmonic(2)
@@ -57,8 +58,12 @@ def swing(gait):
 
 @pytest.mark.parametrize(
     ("body", "symmetry"),
-    [(Chain(FOUR), "none"), (Chain(FOUR, feet=1), "bilateral")],
-    ids=["all gaits met shrink", "one does not, and is not the best of its size"],
+    [
+        pytest.param(Chain(FOUR), "none", id="all gaits met shrink"),
+        slow(
+            (Chain(FOUR, feet=1), "bilateral"), id="one does not, and is not the best of its size"
+        ),
+    ],
 )
 def test_where_gaits_shrink_the_search_goes_on_among_those_that_a_person_sees_move(body, symmetry):
     gait, coarsely = Harmonic(2, symmetry), {"delta": 1e-3, "intervals": 12}

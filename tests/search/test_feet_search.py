@@ -107,6 +107,7 @@ def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says(
     assert stated.work == resolved.work
 
 
+@pytest.mark.slow
 def test_a_certificate_says_how_far_the_feet_press_beside_the_centre_of_mass(solved):
     worm = solved("inchworm")[0]
     statics = next(check for check in worm.certificate.checks if check.name == "statics")

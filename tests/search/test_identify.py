@@ -14,7 +14,7 @@ GAIT = colloc.ellipse(A0=0.3, A1=1.6, B1=1.1)
 WAVE = Fourier([0.0, 0.0, 0.0], [[0.6], [0.3], [-0.3]], [[0.0], [0.5], [0.5]])
 TRUE = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 GEARED = Coupled(Harmonic(1), gears=((1, 0), (0, 1), (-1, 1)))
-FLOOR = Problem("floor", delta=1e-3)
+FLOOR = Problem("floor", delta=1e-2, mesh_tolerance=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +54,7 @@ def recorded(
     return path
 
 
+@pytest.mark.slow
 def test_known_coefficients_lie_within_the_errors_nineteen_times_in_twenty(crawled, tmp_path):
     """Noise of places that lasts tells less."""
     off = []
@@ -69,6 +70,7 @@ def test_known_coefficients_lie_within_the_errors_nineteen_times_in_twenty(crawl
     assert 0.4 < np.sqrt(np.mean(np.square(off))) < 0.6  # of 24 numbers it is known to 15 %
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("point", ["head_", "tail_"])
 def test_any_point_of_the_body_and_its_direction_will_do_in_metres_too(crawled, tmp_path, point):
     path = recorded(tmp_path / "a.csv", crawled, noise=1e-6, point=point, length=0.6)
@@ -117,6 +119,7 @@ def test_markers_at_ends_and_joints_tell_angles_and_path_of_the_centre_of_mass(t
     assert found.mu_b == pytest.approx(TRUE.mu_b, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_with_inertia_the_coefficients_themselves_are_found(tmp_path):
     true = FLOOR.with_(friction=Friction(mu_t=0.5, mu_f=0.3, mu_b=0.4), froude=0.05, delta=1e-2)
     path = recorded(tmp_path / "a.csv", colloc.evaluate(true, GAIT), noise=1e-4, per_period=50)
@@ -127,10 +130,11 @@ def test_with_inertia_the_coefficients_themselves_are_found(tmp_path):
     assert not found.remarks
 
 
+@pytest.mark.slow
 def test_wheels_have_one_coefficient_of_rolling(tmp_path):
     def wheeled(rolling):
         body = Chain((0.25,) * 4, feet=[Wheel(k, rolling=rolling) for k in range(4)])
-        return Problem("wheels", body=body, delta=1e-3)
+        return Problem("wheels", body=body, delta=1e-2, mesh_tolerance=1e-3)
 
     path = recorded(tmp_path / "a.csv", colloc.evaluate(wheeled(0.02), WAVE))
     found = colloc.identify(wheeled(0.1), path)
@@ -152,6 +156,7 @@ def test_a_robot_that_coasts_on_axles_tells_what_resists_rolling_and_slip(tmp_pa
         assert abs(value - true[name]) < 1.5 * error < 0.1 * true[name]
 
 
+@pytest.mark.slow
 def test_what_the_motion_does_not_tell_stays_as_stated_and_is_said(tmp_path):
     """A body that is driven tail first, on feet that hardly slip sideways, tells nothing of sliding
     forwards."""
@@ -159,7 +164,7 @@ def test_what_the_motion_does_not_tell_stays_as_stated_and_is_said(tmp_path):
     def standing(back):
         each = Friction(mu_t=1.0, mu_f=0.1, mu_b=back)
         body = Chain((0.25,) * 4, feet=[Foot(k, friction=each) for k in range(4)])
-        return Problem("standing", body=body, delta=1e-3)
+        return Problem("standing", body=body, delta=1e-2, mesh_tolerance=1e-3)
 
     path = recorded(tmp_path / "a.csv", colloc.evaluate(standing(0.05), WAVE))
     found = colloc.identify(standing(0.08), path)
@@ -176,6 +181,7 @@ def test_what_the_motion_does_not_tell_stays_as_stated_and_is_said(tmp_path):
         assert found.coefficients[name] == (pytest.approx(1.0, abs=0.1), np.inf)
 
 
+@pytest.mark.slow
 def test_motors_may_share_joints(tmp_path):
     geared = Problem("geared", body=Chain((0.25,) * 4), gait=GEARED, delta=1e-3)
     motors = Fourier([0.2, 0.0], [[0.8], [0.3]], [[0.0], [0.9]])
@@ -188,6 +194,7 @@ def test_motors_may_share_joints(tmp_path):
     assert found.problem.friction.mu_b == pytest.approx(TRUE.mu_b, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_path_of_another_body_is_not_explained(crawled, tmp_path):
     path = recorded(tmp_path / "a.csv", crawled)
     rows = np.loadtxt(path, delimiter=",", skiprows=1)
@@ -200,7 +207,9 @@ def test_a_path_of_another_body_is_not_explained(crawled, tmp_path):
 def test_the_command_prints_what_to_write_into_the_problem_file(crawled, tmp_path, capsys):
     recorded(tmp_path / "a.csv", crawled)
     problem = tmp_path / "floor.py"
-    problem.write_text("from colloc import *\nPROBLEM = Problem('floor', delta=1e-3)\n")
+    problem.write_text(
+        "from colloc import *\nPROBLEM = Problem('floor', delta=1e-2, mesh_tolerance=1e-3)\n"
+    )
     assert main(["identify", str(problem), str(tmp_path / "a.csv")]) == 0
     said = capsys.readouterr().out
     found = colloc.identify(FLOOR, tmp_path / "a.csv")

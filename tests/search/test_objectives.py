@@ -1,5 +1,5 @@
-"""Other things than efficiency to be best at: exact derivatives, optima that the replay confirms,
-and what must be reached."""
+"""Other things than efficiency to be best at: optima that the replay confirms, and what must be
+reached; of friction only the ratios of coefficients matter: their size is a unit."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,12 @@ import colloc
 from colloc import Chain, Fourier, Friction, Harmonic, Objective, Problem, ellipse, replay
 from colloc.commands.results import verify
 from colloc.commands.solve import summary_lines
+from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.objective import SPEED
+from colloc.reduced.program import ReducedProgram
+from colloc.search.iterate import space_near
 from colloc.search.solve import solve
+from tests.shared.laws import coulomb
 
 SKEW = Fourier([0.5, 0.5], [[1.0], [0.2]], [[0.0], [1.0]])
 
@@ -65,7 +69,9 @@ def test_a_least_distance_is_reached_for_the_price_of_efficiency():
 
 
 def test_a_turning_gait_turns_by_the_prescribed_angle():
-    solution = solve(Problem("turn", SKEW, gait=Harmonic(1), objective="turning", rotation=0.3), 1)
+    solution = solve(
+        Problem("turn", SKEW, gait=Harmonic(1), objective="turning", rotation=0.3, delta=1e-2), 1
+    )
     assert solution.success
     gait, problem = solution.gait, solution.problem
     at = problem.body, problem.friction, gait, solution.delta_per_period
@@ -108,7 +114,7 @@ def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
 
 def test_every_joint_has_a_limit_of_its_own():
     stated = {"friction": Friction(mu_t=3, mu_f=1, mu_b=1), "joint_limit": (1.0, 2.0)}
-    problem = Problem("stiff", gait=Harmonic(1), delta=1e-3, **stated)
+    problem = Problem("stiff", gait=Harmonic(1), delta=1e-2, **stated)
     solution = solve(problem, 1)
     assert solution.success
     first, second = np.abs(solution.gait.angles(np.linspace(0, 1, 20_001))).max(axis=1)
@@ -123,11 +129,12 @@ def test_every_joint_has_a_limit_of_its_own():
 SLIPPERY = {"gait": Harmonic(1, "bilateral"), "delta": 1e-2, "friction": Friction(0.3, 0.3, 0.3)}
 
 
+@pytest.mark.slow
 def test_where_the_farthest_gait_goes_less_half_of_its_distance_is_asked_for():
     """A long link between two short ones."""
     problem = Problem("stiff", body=Chain((0.2, 0.6, 0.2)), least_distance=0.1, **SLIPPERY)
-    farthest = solve(problem.with_(objective="distance", least_distance=None), 8)
-    solution = solve(problem, 8)
+    farthest = solve(problem.with_(objective="distance", least_distance=None), 4)
+    solution = solve(problem, 4)
     assert farthest.success
     assert solution.success
     ((aim, least),) = solution.problem.at_least
@@ -140,9 +147,11 @@ def test_where_the_farthest_gait_goes_less_half_of_its_distance_is_asked_for():
 
 
 def test_the_full_program_by_itself_keeps_it_too():
-    problem = Problem("far", body=Chain((0.25,) * 4), least_distance=0.22, **SLIPPERY)
+    coarsely = {"delta": 0.1, "delta_start": 0.1, "intervals": 12, "mesh_tolerance": 1e-2}
+    problem = Problem("far", least_distance=0.1, **SLIPPERY | coarsely)
     solution = solve(problem, search="full")
-    assert [least for _, least in solution.problem.at_least] == [0.22]
+    assert [least for _, least in solution.problem.at_least] == [0.1]
+    assert solution.distance > 0.1 * (1 - 1e-3)
 
 
 def test_the_first_line_of_a_gait_that_nobody_sees_says_so():
@@ -152,3 +161,68 @@ def test_the_first_line_of_a_gait_that_nobody_sees_says_so():
     solution = colloc.evaluate(problem, problem.guess)
     assert solution.is_tiny
     assert "tiny gait" in summary_lines(solution, None)[0]
+
+
+def stated(*mu, **changes):
+    coarsely = {"intervals": 24, "delta": 1e-2, "mesh_tolerance": 1e-4}
+    usual = {"gait": Harmonic(1, "bilateral"), "friction": coulomb(*mu), **coarsely}
+    return Problem("unit", ellipse(0.3, 1.0, 0.5), **usual | changes)
+
+
+def test_every_limit_follows_friction_by_its_own_power():
+    def limits(mu):
+        heat = colloc.PathLimit("heat", "sum(moment**2)", 0.04 * mu**2)
+        problem = stated(mu, mu, mu, torque_limit=0.2 * mu, power_limit=0.9 * mu, limits=[heat])
+        return control_problem(problem).actuators
+
+    for light, unit in zip(limits(1e-3).each, limits(1.0).each, strict=True):
+        assert light.name == unit.name
+        np.testing.assert_allclose(light.most, unit.most, rtol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def unit():
+    return solve(stated(1.0, 1.0, 1.0), 1)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e6])
+def test_coefficients_of_any_size_are_solved_and_certified(unit, size):
+    """Work is proportional to the coefficients, efficiency inversely; the gait is the same."""
+    seen = []
+    solution = solve(stated(size, size, size), 1, progress=seen.append)
+    assert solution.status == "solved"
+    assert solution.efficiency * size == pytest.approx(unit.efficiency, rel=1e-9)
+    assert solution.certificate.efficiency * size == pytest.approx(
+        unit.certificate.efficiency, rel=1e-6
+    )
+    assert solution.work / size == pytest.approx(unit.work, rel=1e-9)
+    np.testing.assert_allclose(solution.gait.cos, unit.gait.cos, rtol=1e-6)
+    assert seen[-1].best.value == pytest.approx(solution.value, rel=1e-4)
+    assert all(step.work / size < 10 for step in solution.history)
+    assert solution.answer.kkt_error < 1e-6
+
+
+def test_what_must_be_reached_is_stated_in_units_of_friction_too():
+    least = {"efficiency": 150.0, "distance": 0.2}
+    light = Problem("light", friction=Friction(1e-3, 1e-3, 1e-3), at_least=least)
+    scaled = control_problem(light)
+    assert (scaled.unit, scaled.dynamics.law.mu_t) == (1e-3, 1.0)
+    assert [value for _, value in scaled.aims.at_least] == pytest.approx([0.15, 0.2])
+    # what is proportional to no power of friction is left as it is
+    mixed = light.with_(objective="distance / (work + length)")
+    assert control_problem(mixed).unit == 1.0
+
+
+def test_a_pace_counts_by_its_ratio_to_friction():
+    """Friction drives the momenta: with a tenth of it, at a tenth of the Froude number, a gait
+    moves as it did."""
+    periods = []
+    for size in (1.0, 0.1):
+        space, v = space_near(
+            stated(size, size, size, froude=0.05 * size, gait=Harmonic(1)), ellipse(0.3, 1.0, 0.5)
+        )
+        periods.append(ReducedProgram(space, 1e-2).period(v))
+    unit, light = periods
+    assert unit["distance"] > 1e-3
+    assert light["distance"] == pytest.approx(unit["distance"], rel=1e-9)
+    assert light["work"] == pytest.approx(0.1 * unit["work"], rel=1e-9)

@@ -29,6 +29,7 @@ from colloc.search.options import SearchOptions
 from colloc.search.solve import choose, solve
 from colloc.system.files import run_file
 from colloc.system.row_file import put_rows, read_rows
+from tests.shared.cases import slow_but
 
 AT = {"delta": 1e-2, "delta_start": 0.1, "intervals": 12, "mesh_tolerance": 1e-3}
 QUICK = Problem("quick", gait=Harmonic(1, "bilateral"), **AT)
@@ -66,9 +67,7 @@ class Stop:
         monkeypatch.setattr(Run, "result", stopping)
 
 
-@pytest.mark.parametrize(
-    "number", [1, 8, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 5, 12, 14))]
-)
+@pytest.mark.parametrize("number", slow_but([8], [1, 3, 5, 8, 12, 14]))
 def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(
     undisturbed, tmp_path, monkeypatch, number
 ):
@@ -88,9 +87,8 @@ def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(
     assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
 
 
-@pytest.mark.parametrize(
-    "asked", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("asked", [signal.SIGINT, signal.SIGKILL])
 def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
     file, wanted = undisturbed
     command = [word for word in solve_command(file, tmp_path) if word != "--quiet"]
@@ -106,6 +104,7 @@ def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
     assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
 
 
+@pytest.mark.slow
 def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path, monkeypatch):
     path, result, computed = tmp_path / "x.run.sqlite", Run.result, []
 
@@ -236,6 +235,7 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
     assert not run.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits")
 def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_there(
     undisturbed, tmp_path
@@ -350,6 +350,7 @@ def alone(tmp_path_factory):
     return contents(path)
 
 
+@pytest.mark.slow
 def test_the_file_is_the_same_to_the_last_bit(alone, received, tmp_path, monkeypatch):
     wait_for = Ahead.wait_for
 
@@ -370,6 +371,7 @@ def _die(problem, task):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_so_it_is_if_they_die(alone, received, tmp_path, monkeypatch):
     monkeypatch.setattr(ahead, "_rows_of", _die)
     colloc.solve(PROBLEM, starts=8, output=tmp_path / "quick.h5")

@@ -9,6 +9,7 @@ import pytest
 import colloc
 from colloc.gaits.parameters import parameters
 from colloc.search.sensitivity import sensitivity
+from tests.shared.cases import slow_but
 
 WAYS = ("sideways", "forwards", "backwards")
 MIRRORED = (colloc.Foot(0, 0.2), colloc.Foot(1), colloc.Foot(2, 0.8))
@@ -79,7 +80,9 @@ def of(monkeypatch):
     return only
 
 
-@pytest.mark.parametrize("name", ["friction sideways", "length of link 2"])
+@pytest.mark.parametrize(
+    "name", slow_but(["length of link 2"], ["length of link 2", "friction sideways"])
+)
 def test_slopes_are_those_of_gaits_that_are_sought_again(name, three_link, found, of):
     of(name)
     slope, error = differences(three_link, name, 0.01)
@@ -87,6 +90,7 @@ def test_slopes_are_those_of_gaits_that_are_sought_again(name, three_link, found
     assert abs(found[name].slope - slope) <= found[name].error + error
 
 
+@pytest.mark.slow
 def test_slopes_on_a_finer_mesh_differ_by_no_more_than_the_errors(solved, of):
     """The gait on the mesh of an answer lies beside the true one, which moves slopes to first
     order."""

@@ -17,6 +17,7 @@ from colloc.search.options import COARSE
 from colloc.search.solve import solve
 from colloc.smooth.crawler_body import LAP
 from scripts.continue_epsilon import Crawler, delta_for, epsilon_point, fitted_order
+from tests.shared.cases import slow
 
 BODY = CrawlerBody(0.05, panels=16)
 
@@ -125,7 +126,7 @@ def test_two_bumps_are_antisymmetric_and_keep_their_length():
     np.testing.assert_allclose(chord, chord[0], atol=1e-9)
 
 
-@pytest.mark.parametrize("crawler", [ONE, SIDEWAYS])
+@pytest.mark.parametrize("crawler", [ONE, slow(SIDEWAYS)])
 def test_the_anchor_holds_and_the_stroke_is_the_geometry(crawler):
     """The distance is what the shape shortens or shifts, less a creep of order delta; nothing
     rotates."""
@@ -155,6 +156,7 @@ def test_isotropic_crawler_scales_as_the_paper_says():
     assert 0.99 < periods[-1].efficiency < 1.0
 
 
+@pytest.mark.slow
 def test_two_bump_crawler_beats_nine_tenths_of_the_bound():
     p = SIDEWAYS.with_(epsilon=0.01, delta=2.5e-7).period(intervals=1, quadrature_tolerance=1e-8)
     assert 0.9 / SIDEWAYS.friction.mu_t < p.efficiency < SIDEWAYS.bound

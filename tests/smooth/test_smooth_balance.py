@@ -12,6 +12,7 @@ from colloc.mechanics.friction import line_integrals
 from colloc.results.motion import friction_arrows
 from colloc.smooth.balance import Motion, PanelGrid, curve, node_velocity, resultant, solve_smooth
 from colloc.smooth.crawler_body import LAP
+from tests.shared.cases import slow
 
 ANISOTROPIC = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 
@@ -57,7 +58,7 @@ def test_straight_rotating_body_agrees_with_the_closed_form_of_a_link():
     "motion",
     [Wave().prescribed(), Wave("standing").prescribed(), Wave("tanh", 1.3, 2.0, 4.0).prescribed()],
 )
-@pytest.mark.parametrize("friction", [Friction(), ANISOTROPIC])
+@pytest.mark.parametrize("friction", [slow(Friction()), ANISOTROPIC])
 def test_many_starts_panels_and_methods_agree(motion, friction):
     t = np.array([0.02, 0.2, 0.41])
     base = solve_smooth(motion, friction, t, 1e-3).require()
@@ -251,7 +252,8 @@ def test_turning_is_the_derivative_of_the_tangent_angle_in_the_shape(body):
 
 
 @pytest.mark.parametrize(
-    "law", [LAWS[0], Friction(), Friction(mu_t=100.0), Friction(mu_t=0.5, mu_b=3.0)]
+    "law",
+    [slow(LAWS[0]), slow(Friction()), slow(Friction(mu_t=100.0)), Friction(mu_t=0.5, mu_b=3.0)],
 )
 @pytest.mark.parametrize("body", [ModalBody(3, panels=6), CrawlerBody(0.05, panels=16)], ids=str)
 def test_slopes_of_the_motion_in_balance_are_those_of_differences(body, law):

@@ -46,6 +46,7 @@ def test_neighbours_lie_no_farther_apart_than_twice_the_even_spacing(front):
     assert apart(front).max() <= 2 / 3
 
 
+@pytest.mark.slow
 def test_points_differ_and_what_lies_empty_is_listed():
     """The farthest gait goes 0.286 with an efficiency of 1.4; the next ones 0.269, with 2.1."""
     hole = Problem("hole", None, Chain(feet=1), Friction(0.3, 0.3, 0.3), delta=2e-3, **USUAL)
@@ -67,6 +68,7 @@ def test_the_figure_draws_no_line_over_a_gap(front):
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["no gait found between"]
 
 
+@pytest.mark.slow
 def test_where_one_gait_is_best_in_both_it_is_the_only_point():
     front = pareto_front(PROBLEM, "distance", "distance * 2", 4, starts=1)
     assert len(front.points) == 1
@@ -158,6 +160,7 @@ def test_of_a_quantity_that_is_asked_for_twice_the_larger_value_counts():
     assert [least for _, least in twice.at_least] == [0.2, 0.1]
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_table_that_is_read_as_the_same_front(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "floor.py").write_text(ONE_FLOOR, encoding="utf-8")

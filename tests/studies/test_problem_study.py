@@ -302,6 +302,7 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
         StudyRun(grid(problem=lambda x, y: 3), tmp_path)
 
 
+@pytest.mark.slow
 def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_gait_of_all_its_starts():
     start, elsewhere = ellipse(0.0, 2.0, 1.0), ellipse(0.0, 2.85, 1.3)
     stated = Problem("two", start, gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=12)
@@ -507,6 +508,7 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     np.testing.assert_array_equal(again, table["efficiency"])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
     many = FILE.replace("(1.0, 1.1)", "tuple(1 + 0.01 * k for k in range(40))")
@@ -557,6 +559,7 @@ STUDY = Study("waves", (Axis("mu_t", (100.0, 50.0)),), problem)
 """
 
 
+@pytest.mark.slow
 def test_a_sweep_of_prescribed_motions_measures_each_once(tmp_path, capsys):
     """Nothing travels between neighbours and nothing is sampled where nothing is free."""
     (tmp_path / "study.py").write_text(PRESCRIBED)

@@ -1,5 +1,9 @@
 """The full program: it says what the reduced program says, its derivatives are those of its rows,
-and it grows with the mesh and the links alone."""
+and it grows with the mesh and the links alone; and budgets of counts that no machine disturbs,
+iterations, evaluations, nonzeros, instructions (times are in benchmarks/).
+
+A budget is the count measured when it was written plus a margin of a quarter; raise one only with a
+reason."""
 
 import casadi as ca
 import numpy as np
@@ -8,13 +12,15 @@ import pytest
 import colloc
 from colloc import Chain, Foot, Free, Friction, Harmonic, Pad, Problem, Quantity, Wheel, ellipse
 from colloc.mechanics.balance import joint_moments
+from colloc.numerics.repeated import least_squares_multipliers, quasi_definite_factors
 from colloc.reduced.program import ReducedProgram
 from colloc.search.ipopt import Solver, solve_in_regions
 from colloc.search.iterate import space_near
 from colloc.transcription.full_program import ACTUATORS, AT_LEAST, FullProgram
 from colloc.transcription.layout import RADIANS
-from tests.shared.cases import cases
+from tests.shared.cases import cases, slow_but
 from tests.shared.differences import assert_derivatives_are_differences
+from tests.shared.laws import coulomb
 from tests.shared.stages import program_of
 
 SKEW = Chain((0.3, 0.25, 0.45))
@@ -77,6 +83,11 @@ FEET = Chain(
 FOUR, GEARS, WIDE = Chain((0.25,) * 4), ((1, 0), (0.5, 0.5), (0, 1)), ellipse(0.1, 1.6, 1.1)
 WAVE = colloc.Fourier(np.zeros(3), [[1.2], [0.2], [-1.2]], [[0.7], [1.0], [0.7]])
 CASES = cases(CASES, globals())
+USUAL = "symmetric|feet, wheels and pads|spline|polygon|coupled|serpenoid|uphill|inertia on feet|turning"
+USUAL += (
+    "|free pace|actuators|quantities|driven with inertia|polygon with motors|at least|velocity map"
+)
+each_case = pytest.mark.parametrize("case", slow_but(USUAL.split("|"), CASES))
 
 
 def stated(case, **changes):
@@ -98,7 +109,7 @@ def rows(full, x, delta=0.1):
     return np.array(full.nlp.functions["jac_g"](x, delta / full.delta_unit)[0]).ravel()
 
 
-@pytest.mark.parametrize("case", CASES)
+@each_case
 def test_it_has_the_value_and_the_rows_of_the_reduced_program(case):
     """Every equation holds at a gait in balance, but those that the gait has to be found for."""
     full, x, reduced, v = at_guess(stated(case))
@@ -141,7 +152,7 @@ def test_with_another_lag_a_gait_is_no_member(case):
     assert np.abs(rows(full, x)[full.groups["members"]]).max() > 1e-2
 
 
-@pytest.mark.parametrize("case", CASES)
+@each_case
 def test_jacobian_and_hessian_are_differences_of_its_rows(case):
     full, x, *_ = at_guess(stated(case), 0.3)
     assert_derivatives_are_differences(full.nlp, x, 0.3 / full.delta_unit, 3e-5)
@@ -248,3 +259,66 @@ def test_ipopt_finds_from_the_guess_what_it_confirms():
     again = Solver(full).solve_within(first.x, 0.1, (first.lam_x, first.lam_g), 0.01)
     assert again.optimal
     assert again.objective == pytest.approx(first.objective, rel=1e-9)
+
+
+@pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
+def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_mesh_only(
+    formulation,
+):
+    """No symmetry: the net rotation couples all intervals."""
+    fill = []
+    for intervals in (20, 40):
+        problem = Problem("p", ellipse(0.3, 1, 0.5), intervals=intervals, formulation=formulation)
+        program = program_of(problem)
+        solver = Solver(program)
+        x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
+        jacobian, _ = solver.equality_jacobian(x, 0.1)
+        gradient = np.random.default_rng(1).normal(size=jacobian.shape[1])
+        left = gradient + jacobian.T @ least_squares_multipliers(jacobian, gradient)
+        # what is left is orthogonal to every equation
+        assert np.abs(jacobian @ left).max() < 1e-8 * np.abs(gradient).max()
+        fill.append(quasi_definite_factors(jacobian).L.nnz)
+    assert fill[1] < 2.3 * fill[0]
+
+
+@pytest.mark.parametrize(
+    ("law", "delta", "mean", "largest"),
+    [
+        ((1, 1, 1), 1e-1, 5.5, 12),
+        ((1, 1, 1), 1e-4, 9.7, 24),
+        ((1, 1, 1), 1e-12, 13.5, 80),
+        ((1.7, 1, 1.3), 1e-4, 10, 30),
+        ((0.5, 1, 5), 1e-4, 11, 34),
+        ((10, 1, 1), 1e-4, 10, 150),
+        ((10, 1, 1), 1e-12, 12.5, 140),
+    ],
+)
+def test_steps_of_the_balance_solver(law, delta, mean, largest):
+    rng = np.random.default_rng(0)
+    angles, rates = rng.uniform(-np.pi, np.pi, (2, 2000)), rng.normal(size=(2, 2000))
+    iterations = (
+        colloc.solve_balance(Chain(), coulomb(*law), angles, rates, delta).require().iterations
+    )
+    assert iterations.mean() <= mean
+    assert iterations.max() <= largest
+
+
+@pytest.mark.parametrize(
+    ("name", "iterations", "levels"), [("three_link", 65, 10), ("three_link_offset", 65, 10)]
+)
+def test_effort_of_a_solve(solved, name, iterations, levels):
+    solution, _ = solved(name)
+    assert sum(level.iterations for level in solution.history) <= iterations
+    assert len(solution.history) <= levels
+    assert solution.mesh.n <= 40
+
+
+def test_balance_solves_an_iteration_asks_for():
+    """Value, Jacobian and Hessian at one point share one solve of the balance."""
+    stated = {"gait": Harmonic(1, "bilateral"), "formulation": "implicit velocity"}
+    problem = Problem("p", ellipse(0.3, 1, 0.5), intervals=12, **stated)
+    program = program_of(problem)
+    x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
+    result = Solver(program).solve_within(x, 0.1, None, 1.0)
+    assert result.optimal
+    assert program.velocity.solves <= 1.5 * result.iterations + 6

@@ -62,7 +62,7 @@ def newtons_law(body, law, gait, delta, froude, steps=400, periods=3):
 @pytest.mark.parametrize(
     ("body", "friction", "gait"),
     [
-        (UNEQUAL, ANISOTROPIC, LEANING),
+        pytest.param(UNEQUAL, ANISOTROPIC, LEANING, marks=pytest.mark.slow),
         (HEAVY_HEAD, ANISOTROPIC, LEANING),
         pytest.param(CHAIN, ISOTROPIC, GAIT, marks=pytest.mark.slow),
     ],
@@ -89,7 +89,7 @@ def test_without_friction_momentum_is_conserved():
     np.testing.assert_allclose(now.rates[:, 0], seen, atol=1e-11)
 
 
-@pytest.mark.parametrize("mu", [0.02, 0.01])
+@pytest.mark.parametrize("mu", [0.02, pytest.param(0.01, marks=pytest.mark.slow)])
 def test_errors_that_are_stated_are_no_smaller_where_friction_hardly_brakes(mu):
     """A period leaves nearly all of a change of momenta: a small gap is a motion far off."""
     at = CHAIN, colloc.Friction(mu, mu, mu), LEANING, 1e-3, 1.0
@@ -118,6 +118,7 @@ def test_a_motion_is_stable_where_no_small_change_grows():
         assert not replace(played, multipliers=(0.2, grows, 0.5)).stable
 
 
+@pytest.mark.slow
 def test_slow_motion_is_the_limit():
     """The difference falls at least like the Froude number."""
     slow = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2, tolerance=1e-7).efficiency
@@ -138,7 +139,8 @@ def test_corners_are_passed_where_they_are():
     assert exact.distance == pytest.approx(blind.distance, rel=1e-4)
 
 
-@pytest.mark.parametrize("loss", [0.01, 0.2])
+@pytest.mark.slow
+@pytest.mark.parametrize("loss", [0.01, pytest.param(0.2, marks=pytest.mark.slow)])
 def test_on_a_rougher_floor_slow_enough_is_as_much_faster_and_there_the_part_is_lost(loss):
     froude = [
         colloc.slow_enough(CHAIN, colloc.Friction(mu, mu, mu), GAIT, 1e-2, loss)
@@ -173,6 +175,7 @@ def test_what_inertia_takes_from_a_gait_that_turns_does_not_depend_on_where_its_
     np.testing.assert_allclose(paces, paces[0], rtol=0.03)
 
 
+@pytest.mark.slow
 def test_a_body_from_rest_moves_as_newtons_law_says():
     """The first and the second period differ."""
     at = UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1

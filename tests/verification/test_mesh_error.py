@@ -172,11 +172,7 @@ def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts
 
 @pytest.mark.parametrize(
     ("rule", "friction", "held"),
-    [
-        ("radau-3", UNEQUAL, False),
-        ("radau-3", Friction(), True),
-        ("gauss-3", UNEQUAL, True),
-    ],
+    [("radau-3", UNEQUAL, False), ("radau-3", Friction(), True), ("gauss-3", UNEQUAL, True)],
 )
 def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards(
     rule, friction, held, monkeypatch

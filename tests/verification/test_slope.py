@@ -8,6 +8,7 @@ from shared.points import wrench
 import colloc
 from colloc import Chain, Corners, Foot, Fourier, Friction, Pad, Wheel, replay, slope_motion
 from colloc.gaits.regime import Regime
+from tests.shared.cases import slow
 from tests.shared.laws import coulomb
 
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
@@ -71,7 +72,7 @@ def test_on_the_level_it_is_the_replay():
     assert ran.steering[0] == 1.0
 
 
-@pytest.mark.parametrize("body", [Chain(), PADS], ids=["lying", "pads"])
+@pytest.mark.parametrize("body", [Chain(), slow(PADS)], ids=["lying", "pads"])
 def test_a_gentle_slope_changes_little_and_in_proportion(body):
     level, gentle, twice = (
         slope_motion(body, Friction(), SKEW, 0.1, g, tolerance=1e-8) for g in (0.0, 2e-4, 4e-4)
@@ -82,7 +83,7 @@ def test_a_gentle_slope_changes_little_and_in_proportion(body):
 
 
 @pytest.mark.parametrize(
-    ("body", "grade"), [(LOPSIDED, 0.4), (ON_FEET, 0.25)], ids=["lying", "standing"]
+    ("body", "grade"), [slow((LOPSIDED, 0.4)), (ON_FEET, 0.25)], ids=["lying", "standing"]
 )
 def test_joints_pay_for_friction_and_for_the_climb(body, grade):
     ran = slope_motion(body, UNEQUAL, SKEW, 1e-2, grade, heading=1.0, periods=2)
@@ -91,7 +92,7 @@ def test_joints_pay_for_friction_and_for_the_climb(body, grade):
     np.testing.assert_allclose(ran.joint_work, ran.friction_work + lifted, atol=1e-9)
 
 
-@pytest.mark.parametrize("body", [Chain(), ON_FEET], ids=["lying", "standing"])
+@pytest.mark.parametrize("body", [slow(Chain()), ON_FEET], ids=["lying", "standing"])
 def test_a_mirrored_gait_drifts_to_the_other_side(body):
     ran = slope_motion(body, Friction(), SKEW, 1e-2, 0.2, heading=0.9)
     mirrored = slope_motion(body, Friction(), SKEW.mirrored, 1e-2, 0.2, heading=-0.9)
@@ -124,7 +125,9 @@ def test_skates_hold_across_the_slope_and_not_along():
         slope_motion(Chain(), skates, straight, 1e-6, 0.5, heading=0.0)
 
 
-@pytest.mark.parametrize("mu", [(1, 1, 1), (2, 1, 3)], ids=str)
+@pytest.mark.parametrize(
+    "mu", [(1, 1, 1), pytest.param((2, 1, 3), marks=pytest.mark.slow)], ids=str
+)
 def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
     """Backwards in time, and read from the other end, it is the same gait; the slope is turned over
     with the friction. So the map of headings is its own inverse, and a monotone one that is must be
@@ -143,6 +146,7 @@ def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
     assert abs(half[0] - half[1]) > 1e-2
 
 
+@pytest.mark.slow
 def test_an_antipodal_gait_settles_along_the_fall_line():
     """Of two headings that a period does not turn, others approach one and leave the other."""
 
