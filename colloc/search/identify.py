@@ -192,7 +192,12 @@ def identify(
             f"Slow motion determines only ratios: a common factor, here fixed by "
             f"{fit.names[fit.forward]} as stated, changes only torques and work."
         )
-    if after > _MISSED * fit.extent and alike > _ALIKE:
+    if untold.size and fit.only_ratios and "rolling" in fit.names:
+        remarks.append(
+            "Slow motion on axles may stay the same as they change: record a faster gait, in which "
+            "inertia counts."
+        )
+    elif after > _MISSED * fit.extent and alike > _ALIKE:
         remarks.append(
             "No coefficients reproduce the path: are lengths, order and signs of joints, and y "
             "right?"

@@ -145,15 +145,28 @@ def test_wheels_have_one_coefficient_of_rolling(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_robot_that_coasts_on_axles_tells_what_resists_rolling_and_slip(tmp_path):
+@pytest.mark.parametrize("froude", [0.0, 0.02])
+def test_axles_tell_what_resists_rolling_and_slip_or_slowly_the_ratio(tmp_path, froude):
     def wheeled(rolling, sideways):
         feet = [Wheel(k, rolling=rolling, sideways=sideways, axle=True) for k in range(3)]
-        return Problem("axles", body=Chain((0.3, 0.4, 0.3), feet=feet), delta=1e-3, froude=0.02)
+        return Problem("axles", body=Chain((0.3, 0.4, 0.3), feet=feet), delta=1e-3, froude=froude)
 
     true, stated = {"rolling": 0.02, "sideways": 0.1}, wheeled(0.03, 0.13)
     path = recorded(tmp_path / "a.csv", colloc.evaluate(wheeled(**true), GAIT))
-    for name, (value, error) in colloc.identify(stated, path).coefficients.items():
-        assert abs(value - true[name]) < 1.5 * error < 0.1 * true[name]
+    found, scale = colloc.identify(stated, path).coefficients, 1.0 if froude else 1.5
+    for name in found if froude else ("sideways",):
+        value, error = found[name]
+        assert abs(value - scale * true[name]) < 1.5 * error < 0.1 * value
+
+
+@pytest.mark.slow
+def test_a_slow_body_on_axles_that_tells_nothing_says_so(tmp_path):
+    def wheeled(rolling):
+        feet = [Wheel(k, rolling=rolling, sideways=0.1, axle=True) for k in range(4)]
+        return Problem("axles", body=Chain((0.25,) * 4, feet=feet), delta=1e-3)
+
+    path = recorded(tmp_path / "a.csv", colloc.evaluate(wheeled(0.02), WAVE))
+    assert "record a faster gait" in str(colloc.identify(wheeled(0.05), path))
 
 
 @pytest.mark.slow
