@@ -31,7 +31,7 @@ def test_what_fails_is_told_in_full_and_what_holds_is_counted(three_link):
     assert any(line.startswith(f"  {len(good)} checks passed (tightest: ") for line in lines)
 
 
-LOOP = ellipse(0.0, 1.2, 0.8)
+LOOP, T = ellipse(0.0, 1.2, 0.8), np.linspace(0, 1, 4001)
 
 
 def told_of_limits(gait=LOOP, **limits):
@@ -158,6 +158,9 @@ def test_whatever_shows_a_number_shows_its_own_error_with_it(three_link):
         "work W  1.070000 +- 2e-03",
     ):
         assert words in told
+    swings = (f"{np.degrees(x):.0f}" for x in np.ptp(three_link.gait.angles(T), axis=1))
+    way = f"{', '.join(swings)} degrees (tail to head), the body by 0.31 of its length"
+    assert f"joints move by {way}" in told
     card = shown._repr_html_()
     for words in ("0.21000 ± 3e-03", "0.22000 ± 4e-03", "0.31000", "1.07000"):
         assert words in card

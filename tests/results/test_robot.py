@@ -34,6 +34,7 @@ from tests.shared.inertia import played as with_inertia
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
 SLOW = SIZE | {"period": 5000.0}
 """Where inertia does nothing."""
+QUANTITIES = {"torque": "N·m", "speed": "rad/s", "power": "W"}
 POINTS = 400
 """A link."""
 LENGTH, MASS, FROUDE = 1.2, 3.0, 1.0
@@ -196,6 +197,14 @@ def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, 
     for name, value in robot.facts.items():
         assert told[name] == (value if isinstance(value, str) else pytest.approx(value)), name
     assert (tmp_path / "x.robot.png").stat().st_size > 10_000
+    rows = [line.split()[2:] for line in str(robot).splitlines() if line.startswith("  joint ")]
+    names = "peak_torque_N_m rms_torque_N_m peak_speed_rad_per_s rms_speed_rad_per_s"
+    values = [robot.facts[name] for name in (*names.split(), "peak_joint_power_W")]
+    np.testing.assert_allclose(np.transpose(rows).astype(float), values, rtol=5e-3)
+    for axes, (what, unit) in zip(robot.plot().axes, QUANTITIES.items(), strict=True):
+        assert axes.get_ylabel() == f"{what}  [{unit}]"
+        drawn = [line.get_ydata() for line in axes.lines]
+        np.testing.assert_array_equal(drawn, robot.columns[f"joint_{what}s"].values)
     assert main(["export", str(file), *words, "--rate", "100"]) == 0
     columns = pandas.read_csv(tmp_path / "x.csv", comment="#").query("time_s >= 0")
     torques = np.stack([columns["joint_1_N_m"], columns["joint_2_N_m"]])

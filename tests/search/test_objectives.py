@@ -1,6 +1,8 @@
 """Other things than efficiency to be best at: optima that the replay confirms, and what must be
 reached; of friction only the ratios of coefficients matter: their size is a unit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -154,13 +156,16 @@ def test_the_full_program_by_itself_keeps_it_too():
     assert solution.distance > 0.1 * (1 - 1e-3)
 
 
-def test_the_first_line_of_a_gait_that_nobody_sees_says_so():
+def test_the_first_line_of_a_gait_that_nobody_sees_says_so(three_link):
     problem = Problem(
         "twitch", guess=colloc.ellipse(0, 0.06, 0.05), smallest_shape_speed=0.02, **SLIPPERY
     )
     solution = colloc.evaluate(problem, problem.guess)
     assert solution.is_tiny
     assert "tiny gait" in summary_lines(solution, None)[0]
+    one_moves = colloc.Fourier([0.0, 0.0], [[1.0], [0.01]], [[0.0], [0.01]])
+    seen = replace(three_link, answer=replace(three_link.answer, gait=one_moves))
+    assert not seen.is_tiny
 
 
 def stated(*mu, **changes):
