@@ -3,6 +3,7 @@ the pace of a gait alone, slopes, and what an arc is."""
 
 import json
 import math
+import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -206,6 +207,11 @@ def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, 
         drawn = [line.get_ydata() for line in axes.lines]
         np.testing.assert_array_equal(drawn, robot.columns[f"joint_{what}s"].values)
     assert main(["export", str(file), *words, "--rate", "100"]) == 0
+    lines = (tmp_path / "x.csv").read_text().splitlines()
+    (end,) = (json.loads(line[19:]) for line in lines if line.startswith("# end_body_lengths:"))
+    x, y = 1.2 * np.abs(end)
+    said = rf"its centre is {x:.3g} m \w+ and {y:.3g} to the"
+    assert re.search(said, capsys.readouterr().out)
     columns = pandas.read_csv(tmp_path / "x.csv", comment="#").query("time_s >= 0")
     torques = np.stack([columns["joint_1_N_m"], columns["joint_2_N_m"]])
     np.testing.assert_allclose(torques, robot.torques(np.arange(500) / 500), rtol=1e-4, atol=2e-3)

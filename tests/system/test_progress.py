@@ -181,7 +181,12 @@ CASES = (
 @pytest.mark.parametrize("words", [*CASES, *ALSO])
 def test_every_command_ends_well_in_a_terminal(words, quick, tmp_path):
     place(quick, tmp_path, *(path.name for path in quick.iterdir() if path.is_file()))
-    shown(["colloc", *words.split()], tmp_path)
+    said, _ = shown(["colloc", *words.split()], tmp_path)
+    if words.startswith("steer"):  # five degrees of a circle
+        (line,) = (line for line in said.splitlines() if "+5.00°" in line)
+        radius, chord, work, efficiency = map(float, re.findall(r"\d+\.\d{4,}", line))
+        assert chord == pytest.approx(2 * radius * np.sin(np.radians(2.5)), rel=1e-4)
+        assert efficiency == pytest.approx(chord / work, rel=1e-4)
 
 
 def test_the_first_command_of_the_readme_shows_how_far_it_is_and_then_the_answer_alone(
