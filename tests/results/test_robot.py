@@ -223,6 +223,7 @@ def test_at_the_pace_that_is_slow_enough_inertia_takes_one_percent(three_link, r
     assert slow["inertia_takes"] == pytest.approx(0.01, abs=2e-3)
     assert robot.facts["inertia_takes"] > 0.02
     assert "inertia, which costs 2.5 % of the efficiency at this pace" in str(robot)
+    assert f"would move at {three_link.distance * 1.2 / 5:.4g} m/s" in str(robot)
 
 
 @pytest.fixture(scope="module")

@@ -243,7 +243,7 @@ def test_every_number_can_change_and_nothing_else_does(changes):
 
 def test_what_is_no_optimum_is_refused(three_link, tmp_path):
     given = colloc.evaluate(three_link.problem, three_link.gait)
-    with pytest.raises(colloc.ProblemError, match="the gait was given"):
+    with pytest.raises(colloc.ProblemError, match="this gait was not optimised"):
         given.sensitivity()
     rough = colloc.solve(three_link.problem.with_(delta=1e-4), starts=1, seconds=1e-3)
     with pytest.raises(colloc.ProblemError, match="this solve ended as: interrupted"):

@@ -206,6 +206,8 @@ def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypa
     # the cell that never converges is walked around
     assert np.isnan(table["efficiency"][2, 1])
     assert np.sum(table["efficiency"] > 0.3) == 11
+    for cell, state in run.cells.items():
+        assert table["seconds"][cell] == sum(a.outcome.seconds for a in state.attempts)
     tried, certified = table["starts"], table["starts_certified"]
     assert certified[2, 1] == 0 < tried[2, 1]
     assert (np.delete(certified.ravel(), 7) == np.delete(tried.ravel(), 7)).all()

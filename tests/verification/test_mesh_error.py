@@ -136,6 +136,12 @@ def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     z = colloc.solve_balance(stated.body, friction, angles, rates, DELTA).z
     slow = np.abs(instant(stated.body, friction, angles, rates, z, DELTA).velocity.vs).min(axis=0)
     assert (slow < 30 * DELTA).all()
+    # where forwards and backwards differ, every link that changes its way
+    t = np.linspace(0.0, 0.5, 2002)[1:-1]
+    z = fine.velocity(t[:, None]).reshape(3, -1)
+    vs = instant(stated.body, friction, *GAIT(t), z, DELTA).velocity.vs
+    turns = t[np.nonzero(vs[:, 1:] * vs[:, :-1] < 0)[1]]
+    assert friction.reversible or np.abs(turns[:, None] - kinks).min(axis=1).max() < 1e-3
 
 
 def test_a_kink_is_found_where_the_body_comes_to_rest():

@@ -100,7 +100,10 @@ def test_another_followed_point_changes_the_distance_by_at_most_rotation_times_l
         body, friction, path = random_path(seed)
         result = replay(body, friction, path, 1e-4, tolerance=1e-4)
         assert abs(result.rotation) > 1e-3
-        angles, _ = path(np.zeros(1))
+        angles, _ = path(np.arange(1600) / 1600)
+        outline = np.stack(body.outline(angles)) - body.centre(angles)[:, None]
+        assert result.lever == pytest.approx(np.hypot(*outline).max(), rel=1e-4)
+        angles = angles[:, :1]
         gx, gy = body.centre(angles)
         x, y = body.outline(angles)
         arms = (x - gx + 1j * (y - gy)).ravel()
