@@ -87,6 +87,8 @@ def test_robots_side_by_side_are_drawn_in_metres_and_seconds():
         for length, period in ((0.6, 400), (0.3, 100))
     )
     drawn = [extents(picture) for picture in pictures(big, 8, 1, arrows=False, beside=small)]
+    turned = pictures(small, 8, 1, arrows=False, beside=big)
+    np.testing.assert_allclose([extents(picture)[::-1] for picture in turned], drawn, atol=2)
     lines = 9.0  # of joints and head, whose size does not change [pixels]
     (long, short), (_, again) = drawn[0], drawn[2]
     np.testing.assert_allclose(np.subtract(long, lines), 2 * np.subtract(short, lines), atol=9)
