@@ -1,4 +1,4 @@
-"""Check the table of known gaits from the gaits alone, and take in better ones:
+"""Check the table of known gaits by replaying each, and add better ones:
 python -m benchmarks.referee [--only NAME] [--add FILE.h5 --by COMMAND].
 
 Exit codes: 0 every row holds, 2 bad table or result, or one that is not better, 4 a row does not
@@ -32,7 +32,7 @@ friction, class of gaits, objective, limits and delta.
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.referee",
-        description="Check the best gaits that are known, from the gaits alone; take in better ones.",
+        description="Replay the best known gaits; add better ones.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -66,7 +66,7 @@ class Certificate(Period):
         if not self.replayed:
             return "<Certificate: nothing was replayed>"
         failed = ", ".join(check.name for check in self.failures)
-        verdict = f"fails on {failed}" if failed else f"all {len(self.checks)} checks hold"
+        verdict = f"fails on {failed}" if failed else f"all {len(self.checks)} checks passed"
         return (
             f"<Certificate: {verdict}; d/W = {self.efficiency:.6g} +- {self.efficiency_error:.0e}>"
         )

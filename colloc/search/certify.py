@@ -236,7 +236,7 @@ def _rows(
     elif not isinstance(body, Chain):
         meaning = "other balanced motions of a smooth body are not looked for"
     elif fine.several == 0:
-        meaning = f"no other balanced motion was found at {fine.instants} instants"
+        meaning = f"no other balanced motion was found at {fine.instants} time points"
     else:
         meaning = f"several motions are balanced at {fine.several:.2g} of the cycle"
     yield "one motion", fine.ambiguity, usual.delta_influence, f"relative; {meaning}"

@@ -257,9 +257,9 @@ class SmoothSolution:
         bad = np.flatnonzero(self.residual > self.tolerance)
         if bad.size:
             raise NotConvergedError(
-                f"the smooth body did not balance at {bad.size} of {self.t.size} instants (first: "
-                f"phase {self.t[bad[0]]:.4f}, worst residual {self.residual[bad].max():.1e}); use "
-                f"a larger delta."
+                f"the smooth body did not balance at {bad.size} of {self.t.size} time points "
+                f"(first: phase {self.t[bad[0]]:.4f}, worst residual "
+                f"{self.residual[bad].max():.1e}); use a larger delta."
             )
         return self
 
