@@ -7,7 +7,7 @@ central differences of relative step 1e-5, which Newton solves to 1e-11 allow.
 The slope is off to first order in the distance of the gait from the optimum without a mesh, some
 1e-4 rad. So the gait is optimised again on much finer meshes; the spread of their slopes is the
 error: halves of the answer's intervals, and quarters whose knots lie elsewhere, for meshes with
-knots on the same kinks err alike.
+knots on the same kinks err alike. With inertia halves against whole ones do.
 """
 
 from __future__ import annotations
@@ -198,6 +198,8 @@ def _on_meshes(answer: Answer) -> list[Callable[[Problem], float]]:
         return _lagrangian(optimum.space, optimum.v, delta)
 
     solved = _lagrangian(*space_near(problem, gait, edges, answer.scheme, far), delta)
+    if problem.froude:  # momenta smooth kinks, and meshes of a motion with states cost more
+        return [on(2), solved, on(1, 0.5)]
     fixed = problem.gait.relative_delta or not problem.gait.free
     return [on(8), on(2), solved if fixed else on(4, 0.5)]
 
