@@ -50,7 +50,7 @@ def test_the_lifted_program_follows_the_optimum_to_dry_friction(examples, three_
 
 def test_the_rows_that_the_page_names_are_those_of_the_full_program():
     text = (ROOT / "docs/collocation.md").read_text(encoding="utf-8").partition("rows there")[2]
-    names = re.findall(r"`([^`$]+)`", " ".join(re.findall(r"^\|[^|]*\|([^|]*)\|", text, re.M)))
+    names = re.findall(r"`([^`$]+)`", " ".join(re.findall(r"^- [^:]*\(([^:]*)\):", text, re.M)))
     gait, guess = colloc.Harmonic(1, "bilateral"), colloc.ellipse(0.0, 2.0, 1.0)
     program = program_of(colloc.Problem("plain", gait=gait, guess=guess))
     assert len(names) > 10

@@ -163,12 +163,7 @@ def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypa
 
 def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_fast():
     stated = colloc.Problem(
-        "paced",
-        gait=colloc.Harmonic(1, "antipodal"),
-        froude=0.1,
-        delta=1e-2,
-        guess=ROUND,
-        mesh_tolerance=1e-3,
+        "paced", gait=colloc.Harmonic(1, "antipodal"), froude=0.1, delta=1e-2, guess=ROUND
     )
     found = colloc.solve(stated, starts=1)
     assert found.status == "solved", found.message

@@ -46,7 +46,7 @@ def test_what_does_not_converge_is_reported_and_required_loudly():
     solved = solve_balance(*at, max_iterations=2, method="newton")
     assert not solved.converged.all()
     assert np.array_equal(solved.converged, solved.residual <= 1e-11)
-    with pytest.raises(NotConvergedError, match="of 50 instants"):
+    with pytest.raises(NotConvergedError, match="of 50 time points"):
         solved.require()
 
 

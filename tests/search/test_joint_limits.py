@@ -25,13 +25,13 @@ def slow():
 
 
 CASES = """
-harmonics: gait=Harmonic(2, "bilateral"), speed_limit=(8.0, 8.0), **FAR
+harmonics: gait=Harmonic(2, "bilateral"), speed_limit=(8.0, 8.0), delta=1e-2, **FAR
 splines: gait=BSpline(8, symmetry="bilateral"), speed_limit=8.0, **FAR
-serpenoid: gait=Serpenoid(1), speed_limit=3.0, body=Chain((0.2,) * 5), friction=Friction(mu_t=3)
+serpenoid: gait=Serpenoid(1), speed_limit=3.0, body=Chain((0.2,) * 5), friction=ROUGH, delta=1e-2
 inertia: gait=Harmonic(1, "antipodal"), speed_limit=10.0, froude=0.05
 slope: gait=Harmonic(1), speed_limit=6.0, grade=0.05, friction=UNEVEN, objective="distance"
 """
-UNEVEN = Friction(mu_t=3, mu_f=1, mu_b=1.5)
+ROUGH, UNEVEN = Friction(mu_t=3), Friction(mu_t=3, mu_f=1, mu_b=1.5)
 CASES = cases(CASES, globals())
 
 
@@ -39,7 +39,7 @@ CASES = cases(CASES, globals())
 def test_the_fastest_instants_are_as_fast_as_allowed(case):
     """Also between the points of the mesh, of any class paced by time, and of motions with
     states."""
-    found = solve(Problem("limited", delta=1e-2, **CASES[case]), starts=1)
+    found = solve(Problem("limited", **CASES[case]), starts=1)
     assert found.status == "solved"
     share = fastest(found) / np.broadcast_to(found.problem.speed_limit, found.problem.body.n_joint)
     assert share.max() == pytest.approx(1.0, abs=1e-5)
@@ -49,7 +49,7 @@ def test_the_fastest_instants_are_as_fast_as_allowed(case):
 def test_a_flat_top_that_the_second_round_comes_back_to_is_no_end():
     """Instants that move far make the first round overshoot; the rounds that follow them settle."""
     asked = {"speed_limit": (7, 11), "objective": "distance"}
-    stated = Problem("flat", gait=Harmonic(2), delta=1e-2, **asked)
+    stated = Problem("flat", gait=Harmonic(2), delta=1e-2, mesh_tolerance=1e-3, **asked)
     assert solve(stated, starts=1).status == "solved"
 
 
