@@ -250,7 +250,7 @@ def sweep_summary(study: Study, table: StudyTable, path: Path) -> tuple[dict[str
     columns, total = table.variables, math.prod(study.shape)
     words = {SOLVED: SOLVED, "not tried": "not tried yet", "no problem": "no problem"}
     status = columns["status"]
-    tally = Counter(words.get(each, "no certified gait") for each in status.flat)
+    tally = Counter(words.get(each, "no verified gait") for each in status.flat)
     below = [*map(tuple, np.argwhere(columns["below_neighbour"]).tolist())]
     facts = {
         "name": study.name,

@@ -30,8 +30,8 @@ SUBCOMMANDS = {
     "solve": ("solve", "find the best gait of a problem file, certify it, save and draw it"),
     "multistart": ("families", "solve from many random starts; list the distinct optima"),
     "sweep": ("families", "solve a study, a grid of problems, over processes"),
-    "pareto": ("families", "trade-off (Pareto front) of two objectives, as certified gaits"),
-    "steer": ("families", "certified gaits from sharp right to sharp left, for a controller"),
+    "pareto": ("families", "trade-off (Pareto front) of two objectives, as verified gaits"),
+    "steer": ("families", "verified gaits from sharp right to sharp left, for a controller"),
     "evaluate": ("solve", "evaluate a gait of your own: joint angles from a CSV file"),
     "identify": (
         "solve",

@@ -112,7 +112,7 @@ def verify(options: argparse.Namespace) -> int:
         )
     good = now.passed and not complaint and solution.success
     lines = [
-        f"{problem.name}: {'certified' if good else 'NOT CERTIFIED'}",
+        f"{problem.name}: {'verified' if good else 'NOT VERIFIED'}",
         f"  {problem.objective.label:<15s} {now.value:.8f} +- {now.value_error:.0e} by replay "
         f"({now.instants} time points)",
     ]

@@ -381,7 +381,7 @@ def solve(options: argparse.Namespace) -> int:
         if saved and not options.json:
             print(f"  saved {', '.join(saved)}", flush=True)
         if options.front and not solution.success:
-            cli.complain("no front, as the answer is not certified.")
+            cli.complain("no front, as the answer is not verified.")
         elif options.front:
             from colloc.commands.front import find_front
             from colloc.search.options import OPTIONS

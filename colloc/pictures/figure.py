@@ -493,7 +493,7 @@ def _draw_cost(axes: Axes, family: Steering) -> None:
     axes.scatter(turns, values, c=snapshot_colours(len(turns)), s=28, zorder=2)
     failed = ~np.array([point.success for point in family.points])
     if failed.any():
-        axes.plot(turns[failed], values[failed], "x", color=VERMILION, ms=9, label="not certified")
+        axes.plot(turns[failed], values[failed], "x", color=VERMILION, ms=9, label="not verified")
     if (spot := family.on_the_spot) is not None:
         label = "on the spot, with least work"
         axes.plot(np.degrees(spot.turns), spot.efficiency, "s", color=VERMILION, ms=4, label=label)

@@ -257,7 +257,7 @@ def choose(problem: Problem, solutions: Sequence[Solution]) -> Solution:
     better = [each for each in solutions if value(each) > value(solution)]
     failing = [each for each in better if not passes(each)]
     if passes(solution) and failing:
-        text = f"A gait of {value(failing[0]):.4f} is not certified: {failing[0].message}"
+        text = f"A gait of {value(failing[0]):.4f} is not verified: {failing[0].message}"
         solution.message = f"{solution.message} {text}".strip()
     smaller = [each for each in better if passes(each) and not is_visible(each.answer.gait)]
     if finite and smaller and not problem.shrinking:

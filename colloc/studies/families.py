@@ -113,7 +113,7 @@ class ParetoFront:
 
     def __repr__(self) -> str:
         first, second = (aim.name for aim in self.objectives)
-        counts = f"{len(self.points)} certified points, {len(self.gaps)} gaps"
+        counts = f"{len(self.points)} verified points, {len(self.gaps)} gaps"
         return f"<ParetoFront of {self.problem.name}: {first} against {second}, {counts}>"
 
 
@@ -170,7 +170,7 @@ def pareto_front(
     >>> floor, gait = colloc.Friction(mu_t=10), colloc.Harmonic(1, "bilateral")
     >>> problem = colloc.Problem("quick", friction=floor, gait=gait, delta=1e-2)
     >>> colloc.pareto_front(problem, "speed", "efficiency", 3, starts=1)
-    <ParetoFront of quick: speed against efficiency, 3 certified points, 0 gaps>
+    <ParetoFront of quick: speed against efficiency, 3 verified points, 0 gaps>
     """
     problem = best.problem if best else problem
     if not problem.gait.free:
@@ -208,7 +208,7 @@ def pareto_front(
         end = end or solve_member(stated.with_(objective=aims[k]), starts)
         if not end.success:
             raise ProblemError(
-                f"the gait of best {aims[k].name} is not certified, so there is no front: "
+                f"the gait of best {aims[k].name} is not verified, so there is no front: "
                 f"{end.message}"
             )
         add(end)
@@ -375,7 +375,7 @@ class Steering:
 
     def __repr__(self) -> str:
         turns = ", ".join(f"{math.degrees(turn):+.4g}" for turn in self.turns)
-        verdict = "all certified" if self.certified else "NOT all certified"
+        verdict = "all verified" if self.certified else "NOT all verified"
         return f"<Steering of {self.problem.name}: {turns} degrees per cycle, {verdict}>"
 
 
@@ -423,7 +423,7 @@ def steer(
     >>> import colloc
     >>> problem = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
     >>> colloc.steer(problem, [0.0, 0.1], starts=1)
-    <Steering of quick: +0, +5.73 degrees per cycle, all certified>
+    <Steering of quick: +0, +5.73 degrees per cycle, all verified>
     """
     if not problem.gait.free or problem.regime.slides or problem.rotation != 0:
         raise ProblemError(
@@ -448,7 +448,7 @@ def steer(
     straight = member(0.0, problem)
     if not straight.success:
         raise ProblemError(
-            f"the straight gait is not certified, so there is nothing to steer: {straight.message}"
+            f"the straight gait is not verified, so there is nothing to steer: {straight.message}"
         )
     anywhere = problem.gait.with_symmetry(NONE)
     bent = problem.joint_map is not None and any(problem.joint_map.rest)

@@ -217,7 +217,7 @@ class Starts:
             return reopen(self.problem, next(o for o in self.outcomes if o.start == start))
         if not self.optima:
             raise NotConvergedError(
-                f"none of {len(self.outcomes)} starts of {self.problem.name} was certified."
+                f"none of {len(self.outcomes)} starts of {self.problem.name} was verified."
             )
         return reopen(self.problem, self.optima[0].best)
 

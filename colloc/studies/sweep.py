@@ -260,7 +260,7 @@ class StudyTable(Table):
     def __repr__(self) -> str:
         status = self.variables["status"]
         certified = int((status == SOLVED).sum())
-        return f"<StudyTable {self.name}: {certified} of {status.size} cells have a certified gait>"
+        return f"<StudyTable {self.name}: {certified} of {status.size} cells have a verified gait>"
 
 
 def study_table(

@@ -42,7 +42,7 @@ class NotConvergedError(CollocError, RuntimeError):
     >>> problem = colloc.Problem("x")
     >>> colloc.Starts(problem, ()).solution()
     Traceback (most recent call last):
-    colloc.system.errors.NotConvergedError: none of 0 starts of x was certified.
+    colloc.system.errors.NotConvergedError: none of 0 starts of x was verified.
     """
 
 

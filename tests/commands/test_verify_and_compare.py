@@ -26,7 +26,7 @@ def test_verify_certifies_without_loading_casadi_or_matplotlib(three_link, tmp_p
     words = [sys.executable, "-c", code, str(file)]
     result = subprocess.run(words, capture_output=True, text=True, check=True)
     assert result.stdout.splitlines()[-1] == "0 []"
-    assert "three_link: certified" in result.stdout
+    assert "three_link: verified" in result.stdout
     assert result.stderr == ""
 
 
@@ -44,7 +44,7 @@ def test_verify_finds_a_tampered_gait(three_link, tmp_path, capsys):
     tampered = replace(three_link, answer=replace(three_link.answer, x=x))
     file = save(tampered, tmp_path / "gait.h5")
     assert recheck.verify([str(file)]) == 4
-    assert "NOT CERTIFIED" in capsys.readouterr().out
+    assert "NOT VERIFIED" in capsys.readouterr().out
 
 
 STATED = ("distance", "work", "rotation", "length")

@@ -206,7 +206,7 @@ def test_the_replay_is_as_accurate_as_was_asked_for(three_link, tmp_path, capsys
     file = save(three_link, tmp_path / "a.h5")
     assert recheck([str(file), "--tolerance", "1e-9"]) == 0
     assert recheck([str(file), "--tolerance", "1e-15"]) == 4
-    assert "NOT CERTIFIED" in capsys.readouterr().out
+    assert "NOT VERIFIED" in capsys.readouterr().out
 
 
 LONG = [

@@ -524,7 +524,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
     said = "interrupted; what is done is kept, and the same command goes on from there."
     assert errors == f"colloc: {said}\n"
     assert " not tried yet" in rest
-    assert "no certified gait" not in rest
+    assert "no verified gait" not in rest
     reported = sum("round 0" in line for line in [*lines, *rest.splitlines()])
     assert reported >= 2
     assert np.sum(load_study(tmp_path / "tiny.nc").variables["efficiency"] > 0) >= reported
