@@ -74,6 +74,7 @@ def test_a_class_of_your_own_is_searched_certified_kept_and_read(monkeypatch, tm
     assert read.problem.hash == own.problem.hash
 
 
+@pytest.mark.slow
 def test_a_class_that_is_no_fourier_series_is_one_file_too(monkeypatch, tmp_path):
     own = run("own_gait_class.md", monkeypatch)
     found = solve(Problem("pulses", gait=own.Pulses(6, symmetry="antipodal"), **COARSELY), starts=1)

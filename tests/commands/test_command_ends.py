@@ -139,6 +139,7 @@ def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning_and_not_the_bo
         assert upper_bound(problem, tmp_path / "file" / "below", compute=True) is problem.friction
 
 
+@pytest.mark.slow
 def test_a_broken_cache_of_bounds_costs_a_line_and_no_summary(solve, tmp_path):
     (tmp_path / "bounds.sqlite").write_text("{")
     code, said, complaint = solve("--no-figure")
@@ -148,6 +149,7 @@ def test_a_broken_cache_of_bounds_costs_a_line_and_no_summary(solve, tmp_path):
     assert complaint.count("No bound is taken from it") == 1
 
 
+@pytest.mark.slow
 def test_a_bound_that_cannot_be_computed_costs_no_summary(solve, quick, tmp_path):
     text = QUICK.replace("delta=0.3,", 'delta=0.3, objective="speed",')
     code, said, complaint = solve("--bound", "--no-figure", text=text)

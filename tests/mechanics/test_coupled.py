@@ -29,6 +29,7 @@ def broken():
     return solved(FOUR, BROKEN)
 
 
+@pytest.mark.slow
 def test_a_stuck_joint_of_a_straight_body_makes_two_links_one():
     stuck = solved(FOUR, Coupled(Harmonic(1), stuck={1: 0.0}))
     whole = solved(Chain((0.25, 0.5, 0.25)), Harmonic(1))

@@ -57,6 +57,7 @@ def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_them
     assert (np.abs(body.forces(law, angles, rates, z, 1e-9)) <= most[:, None] * (1 + 1e-12)).all()
 
 
+@pytest.mark.slow
 def test_a_bound_knows_the_weights_or_refuses():
     heavy = Chain(weights=(0.4, 0.2, 0.4))
     budget = Budget(intervals=4, shapes=6, directions=12, rounds=2)

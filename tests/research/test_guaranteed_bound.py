@@ -122,6 +122,7 @@ def proved_at(q, r, state, load):
     ].T
 
 
+@pytest.mark.slow
 @needs_kernel
 def test_loaded_forces_bound_the_power_from_below():
     """Weak duality: admissible forces in balance with a load prove J(z) >= beta.r + load.z for

@@ -28,6 +28,7 @@ extern "C" void operations(int n, const double *given, Interval *found)
 """
 
 
+@pytest.mark.slow
 def test_operations_hold_the_exact_results_of_all_that_their_operands_hold(tmp_path):
     (tmp_path / "operations.cpp").write_text(OPERATIONS)
     headers = {"interval.hpp": (kernel.SOURCES / "interval.hpp").read_text("ascii")}

@@ -15,6 +15,7 @@ from colloc.results.measured import extrapolated_limit
 from colloc.search import certify as verify
 from colloc.search.certify import certify, gait_certificate
 from colloc.verification import replay as replay_module
+from tests.shared.cases import slow_but
 
 JUST_BELOW, JUST_ABOVE = 0.95, 1.05
 
@@ -155,7 +156,9 @@ def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(
     assert run(-1.0) == run(0.0) == set()
 
 
-@pytest.mark.parametrize(("part", "passes"), [(-1.15, False), (0.85, True), (1.15, False)])
+@pytest.mark.parametrize(
+    ("part", "passes"), slow_but([(1.15, False)], [(-1.15, False), (0.85, True), (1.15, False)])
+)
 def test_a_way_on_a_slope_may_lead_off_by_a_thousandth_of_a_radian(part, passes):
     """Where the gait goes is known from another integration; it is asked to go beside that."""
     gait = replace(ellipse(0, 2.8, 1.3), theta=0.7)

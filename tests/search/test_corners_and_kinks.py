@@ -43,6 +43,7 @@ def test_refinement_encloses_a_kink_instead_of_following_it():
     assert len({step.intervals for step in solution.history}) <= 4
 
 
+@pytest.mark.slow
 def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
     """Nearest to it, no gradient is below 1e-3; those of both sides cancel. Which meshes lead there
     depends on rounding: of some thirty such starts two did not settle, and one ended on a mesh that

@@ -70,6 +70,7 @@ def test_a_least_distance_is_reached_for_the_price_of_efficiency():
     assert far.problem.at_least == stated.at_least
 
 
+@pytest.mark.slow
 def test_a_turning_gait_turns_by_the_prescribed_angle():
     solution = solve(
         Problem("turn", SKEW, gait=Harmonic(1), objective="turning", rotation=0.3, delta=1e-2), 1

@@ -63,6 +63,7 @@ def test_the_problem_file_is_certified_beats_the_paper_s_crawler_and_is_kept(tmp
     np.testing.assert_array_equal(read.sample(0.3).tail, found.sample(0.3).tail)
 
 
+@pytest.mark.slow
 def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     """The paper's crawler as it is, collocated but not searched nor certified."""
     body = CrawlerBody(epsilon=0.2, modes=2, panels=4)

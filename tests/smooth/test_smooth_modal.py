@@ -134,6 +134,7 @@ def problem(**changes) -> Problem:
     return Problem("wave", **(fields | {"intervals": 8} | changes))
 
 
+@pytest.mark.slow
 def test_the_optimum_beats_the_paper_s_wave_and_is_certified(tmp_path):
     found = solve(problem(body=ModalBody(4, "fourier", panels=4)), 1)
     reference = measured_period(Wave().prescribed(), SIDEWAYS, found.problem.delta)
