@@ -27,6 +27,7 @@ SMOOTHING = 1e-3
 CLEARANCE_SMOOTHING = 2e-4
 """Width [body lengths] of smoothed absolute values and minima; they err to the safe side, by at
 most twice this."""
+_ROUNDING = 1e-12
 Pair = tuple[int, int]
 Pairs = tuple[Pair, ...]
 
@@ -133,15 +134,21 @@ def _crossing_sum(angles: Array, numbers: Array) -> Array:
     xp, a, b = namespace(angles), angles[:1, :], angles[1:, :]
     side, link, middle = (numbers[k : k + 1, :] for k in range(3))
     chi = xp.arctan2(link * xp.sin(a), middle + link * xp.cos(a))
-    return side * (b + xp.where(link == middle, 0.5 * a, chi)) - np.pi
+    return side * (b + xp.where(_are_equal(link, middle), 0.5 * a, chi)) - np.pi
+
+
+def _are_equal(link: Array, middle: Array) -> Array:
+    """True if lengths are equal but for rounding, which decides about chi where they fold up."""
+    return (link - middle) ** 2 <= (_ROUNDING * middle) ** 2
 
 
 def _slopes_of_sum(angles: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     side, link, middle = numbers
     along = link * np.cos(angles[0])
     bend = link * link + middle * along
-    square = np.where(link == middle, 1.0, bend + middle * (middle + along))
-    return side * np.stack([np.where(link == middle, 0.5, bend / square), np.ones_like(bend)])
+    equal = _are_equal(link, middle)
+    square = np.where(equal, 1.0, bend + middle * (middle + along))
+    return side * np.stack([np.where(equal, 0.5, bend / square), np.ones_like(bend)])
 
 
 def far_contact(body: Any, first: int, second: int) -> Contact:

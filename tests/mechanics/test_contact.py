@@ -152,6 +152,16 @@ def test_all_contacts_at_once_have_the_values_and_slopes_of_each_by_itself(lengt
     assert np.array_equal(values[rate], shapes[0, rate] / 2.0)
 
 
+def test_links_of_equal_lengths_but_for_rounding_fold_up_like_equal_ones():
+    folded = np.pi * np.array([[1.0, -1.0, 0.2], [0.3, 0.1, -1.0]])[:, np.repeat([0, 1, 2], 4)]
+    which, alike = np.resize([2, 3], 12), []
+    for middle in (1 / 3, np.nextafter(1 / 3, 1)):
+        checks = shape_checks(Chain((1 / 3, middle, 1 / 3)))
+        values = checks.values(which, folded)
+        alike.append([values, *checks.slopes(which, folded, np.full(which.size, -1.0))])
+    np.testing.assert_allclose(*alike, atol=1e-12)
+
+
 @pytest.mark.parametrize("order", [1, -1])
 def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_and_after(order):
     """The head of three equal links is (sin a + sin(a + b))/3 beside the first one's line."""
