@@ -226,7 +226,7 @@ def test_where_no_start_keeps_the_limits_the_search_ends_soon_and_says_what_is_m
     found = solve(stated, progress=lambda news: tried.append(news.done))
     assert max(tried) == OPTIONS.patience
     assert found.status == "not converged"
-    assert re.search(f"the limit on the {words}.* allow the joints more", found.message)
+    assert re.search(f"the limit on the {words}.* relax the limits", found.message)
     assert "None of 8 starts led to a gait of the class that keeps the limits" in found.message
 
 
