@@ -194,8 +194,8 @@ def identify(
         )
     if untold.size and fit.only_ratios and "rolling" in fit.names:
         remarks.append(
-            "Slow motion on axles may stay the same as they change: record a faster gait, in which "
-            "inertia counts."
+            "Slow motion on axles may be the same for other coefficients: record a faster gait, in "
+            "which inertia counts."
         )
     elif after > _MISSED * fit.extent and alike > _ALIKE:
         remarks.append(

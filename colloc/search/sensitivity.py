@@ -7,7 +7,7 @@ central differences of relative step 1e-5, which Newton solves to 1e-11 allow.
 The slope is off to first order in the distance of the gait from the optimum without a mesh, some
 1e-4 rad. So the gait is optimised again on much finer meshes; the spread of their slopes is the
 error: halves of the answer's intervals, and quarters whose knots lie elsewhere, for meshes with
-knots on the same kinks err alike. With inertia halves against whole ones do.
+knots on the same kinks err alike. With inertia halves and the answer's intervals are enough.
 """
 
 from __future__ import annotations
