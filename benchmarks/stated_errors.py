@@ -95,7 +95,7 @@ def _finer(errors: Any) -> float:
 def _true_motion(case: Case, near: np.ndarray, aim: float) -> dict[str, float]:
     """By Newton's method, until rounding hides how its steps become smaller."""
     played, before = GaitWithInertia(*case[:4], froude=case.froude, breaks=()), np.inf
-    per_start = np.eye(3) - played.period_map(near)[1][:3]
+    per_start = np.eye(3) - played.rough_period(near).slopes[:3]
     while True:
         states = played.run(near, aim).states
         step = np.linalg.solve(per_start, states[:3, -1] - near)

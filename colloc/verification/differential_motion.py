@@ -473,36 +473,23 @@ class GaitWithInertia(_Gait):
             **{each.name: float(change[7 + k]) for k, each in enumerate(self.quantities)},
         }
 
-    def _apart(self, start: np.ndarray) -> tuple[Course, np.ndarray, np.ndarray]:
-        """A run from some momenta and three beside them; states before and after, ``(4, 7)``."""
-        begin = np.zeros((4, 7))
-        begin[:, _MOMENTA] = start + np.vstack([np.zeros(3), _APART * np.eye(3)])
-        begin[:, _THETA] = self.theta
-        ran = self.run(begin, self._rough)
-        return ran, begin, ran.states[:, -1].reshape(begin.shape)
-
-    def _map_of(
-        self, ran: Course, begin: np.ndarray, end: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        sums = [self.sums(ran, self._rough, motion=k)[:, 0] for k in range(len(begin))]
-        end = np.column_stack([end, sums])
-        begin = np.pad(begin, ((0, 0), (0, len(self.quantities))))
-        return np.stack([begin[0], end[0]], axis=1), (end[1:] - end[0]).T / _APART
-
-    def period_map(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States before and after a cycle ``(7 + k, 2)``, and derivatives of the latter by the
-        momenta before it, ``(7 + k, 3)``, by differences."""
-        return self._map_of(*self._apart(start))
-
     def rough_period(self, near: np.ndarray) -> RoughPeriod:
-        start = near
+        """By Newton's method, with derivatives from three runs beside each one."""
+        start, begin = near, np.zeros((4, 7))
         for _ in range(_MOST_STEPS):
-            ran, begin, end = self._apart(start)
+            begin[:, _MOMENTA] = start + np.vstack([np.zeros(3), _APART * np.eye(3)])
+            begin[:, _THETA] = self.theta
+            ran = self.run(begin, self._rough)
+            end = ran.states[:, -1].reshape(begin.shape)
             first, *others = end[:, _MOMENTA]
             step = _newton_step(first - start, np.subtract(others, first).T / _APART)
             start = start + step
             if np.abs(step).max() < _LEFT_OPEN * self._rough:
-                return RoughPeriod(start, *self._map_of(ran, begin, end))
+                sums = [self.sums(ran, self._rough, motion=k)[:, 0] for k in range(len(begin))]
+                end = np.column_stack([end, sums])
+                before = np.pad(begin[0], (0, len(self.quantities)))
+                slopes = (end[1:] - end[0]).T / _APART
+                return RoughPeriod(start, np.column_stack([before, end[0]]), slopes)
         raise self._not_alike()
 
     def find_period(self, near: np.ndarray | None = None) -> RoughPeriod:

@@ -243,10 +243,10 @@ def test_on_feet_that_hold_the_map_of_a_period_is_found_soon_however_dry_frictio
 
     law = standing.law(colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3))
     played = GaitWithInertia(standing, law, path, 1e-7, froude=0.02)
-    _, slopes = played.period_map(played.momenta())
+    slopes = played.rough_period(played.momenta()).slopes
     # friction leaves nothing of the momenta of the period before
     assert np.abs(slopes[:3]).max() < 1e-6
-    # some 30,000, by rounding, where more would let the first method give up
+    # some 12,000, by rounding, where more would let the first method give up
     assert len(asked) < 50_000
 
 
