@@ -87,7 +87,7 @@ def test_a_polygon_climbs_better_and_is_certified_and_kept(uphill, tmp_path, cap
     path = save(found, tmp_path / "sides.h5")
     assert load(path).gait.theta == gait.theta
     assert verify([str(path)]) == 0
-    assert "certified" in capsys.readouterr().out
+    assert "verified" in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -127,7 +127,7 @@ def test_it_is_kept_verified_and_summarised_like_any_other(uphill, tmp_path, cap
     assert again.problem.hash == PROBLEM.hash
     assert again.gait.theta == uphill.gait.theta
     assert verify([str(path)]) == 0
-    assert "certified" in capsys.readouterr().out
+    assert "verified" in capsys.readouterr().out
     assert any("slope of grade 0.1" in line for line in summary_lines(again, None, verbose=True))
 
 
