@@ -9,6 +9,7 @@ import pytest
 
 import colloc
 from colloc import Chain, Foot, Friction, Harmonic, PowerLaw, Problem, ProblemError, Wave
+from colloc.bounds.potential import TensorSpline
 from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.gaits.prescribed import Prescribed
 from colloc.smooth.balance import Motion, solve_smooth
@@ -41,6 +42,10 @@ def driven(body=None, **said):
     return Problem("c", body=body or Chain((0.25,) * 4), gait=gait)
 
 
+def robot(**said):
+    return colloc.Robot(**{"length": 0.62, "mass": 0.9, "period": 2.5} | said)
+
+
 def motion(stages, antipodal=False):
     return Motion(lambda s, t: s, lambda s, t: s, stages=stages, antipodal=antipodal)
 
@@ -64,7 +69,8 @@ def path(angles, rates):
 
 NAMES = {name: getattr(colloc, name) for name in colloc.__all__} | globals()
 NAMES |= {
-    each.__name__: each for each in (checked_chain, dry_friction, Prescribed, Wave, solve_smooth)
+    each.__name__: each
+    for each in (checked_chain, dry_friction, Prescribed, TensorSpline, Wave, solve_smooth)
 }
 
 
@@ -233,9 +239,7 @@ replay(*AT, path(0.7, 0.0), 1e-4) -> does not move
 Friction(1, mu_t=2) -> multiple values for argument 'mu_t'
 Problem("x", froude=Free("a", 1)) -> two numbers above 0
 Fourier([0], [[1]], [[0]], theta=float("nan")) -> theta must be a number
-solve(PROBLEM, starts="3") -> starts must be a whole number or None, not '3'
-solve(PROBLEM, starts=1.5) -> starts must be a whole number or None, not 1.5
-solve(PROBLEM, starts=True) -> starts must be a whole number or None, not True
+solve(PROBLEM, starts="3") | solve(PROBLEM, starts=1.5) | solve(PROBLEM, starts=True) -> a whole number or None, not ('3'|1.5|True)
 Reference("high", 0.1, "me") -> efficiency must be a number
 Axis("x", 3) | Axis("x", (10**400,)) -> values of an axis must be
 multistart(PROBLEM, 1, sampler="x") -> sampler must be one of latin-hypercube
@@ -260,8 +264,8 @@ solve(5) -> problem must be a Problem
 solve(PROBLEM, starts=0) -> starts must be a whole number of at least 1
 solve(PROBLEM, seconds=np.nan) -> seconds must be .*, not nan
 Chain((0.3, 0.3, 0.4 + 1e-3)) | Chain((0.3, 0.3, 0.4 - 1e-3)) | Chain((0.3, 0.3, 0.4 + 1e-10)) -> must add up to
-Chain(weights=(0.5, 0.5, 0.5)) | Chain(weights=(0.5, 0.5, 0.0)) | Chain(weights=(0.5, 0.5, "x")) -> body\.weights
-Chain(weights=(0.5, 0.5, np.nan)) -> body\.weights
+Chain(width=-0.01) | Chain(width=1 / 3) | Chain(width=np.nan) | Chain(width=np.inf) | Chain(width=True) | Chain(width=None) -> width
+Chain(weights=(0.5, 0.5, 0.5)) | Chain(weights=(0.5, 0.5, 0.0)) | Chain(weights=(0.5, 0.5, "x")) | Chain(weights=(0.5, 0.5, np.nan)) -> body\.weights
 Chain(weights=(1.0,)) | Chain(masses=(0.5, 0.5)) | Chain(inertias=(0.1, 0.1)) -> one for each of the 3 links
 Chain(weights=3.0) -> sequence of numbers
 Chain(masses=(0.5, 0.5, 0.5)) -> the body's mass 1
@@ -277,8 +281,7 @@ OwnLaw("-vs/speed - 0.5*vn/speed", "-vn/speed") -> left and right
 Chain(feet=(Foot(0, 0.2, 1 / 3), Foot(0), Foot(1), Foot(2))) -> bear all that
 Chain(feet=-1) -> 0 \(a line\) to
 Chain(feet="many") | Chain(feet=0.5) -> sequence of Foot
-Foot(0, place=1.2) | Foot(0, place=float("nan")) | Foot(0, 0.9, extent=0.4) -> must lie on its link
-Pad(0, 0.2, 1.2) -> must lie on its link
+Foot(0, place=1.2) | Foot(0, place=float("nan")) | Foot(0, 0.9, extent=0.4) | Pad(0, 0.2, 1.2) -> must lie on its link
 Foot(0.5) -> whole number
 motion_from_rest(**ON, froude=0.1, periods=0) -> whole number
 Foot(0, weight=0.0) -> positive part
@@ -293,8 +296,21 @@ Wheel(0, friction=Friction()) -> take Foot
 Friction(mu_t=-1) | Friction(mu_t=np.inf) -> mu_t
 Friction(mu_f=0) | Friction(mu_f="1") -> mu_f
 Friction(mu_b=np.nan) -> mu_b
+Axle(rolling=0.0) -> rolling
+Axle(sideways=-1.0) -> sideways
+robot(length=62.0) -> 62 metres.*write length=0.62
+robot(mass=0.0) -> mass must be a number
+robot(period=(3.0, 2.0)) -> the shortest and the longest
+robot(idle_power=-1.0) -> idle_power must be a number from 0 on
+Problem("x", robot=robot(), froude=0.1) -> froude follows from the robot
+Problem("x", robot={"length": 1}) -> robot must be a Robot
 solve_balance(*AT, ONES, ONES, 0.0) | solve_balance(*AT, ONES, ONES, -1e-4) | solve_balance(*AT, ONES, ONES, np.nan) -> delta
 solve_balance(*AT, np.zeros((3, 4)), ONES, 1e-4) -> shape
+solve_balance(Belt(), Friction(), np.ones((1, 5)), np.ones((1, 5)), 1e-3) -> not its 2 joints
+solve_smooth(Wave().prescribed(), Friction(), np.array([0.1]), 0.0) -> delta must be a positive
+solve_smooth(Motion(lambda s, t: s * np.nan, lambda s, t: s), Friction(), np.array([0.1]), 1e-3) -> finite
+TensorSpline(2, 2.5, 4, (-1.0, 0.0, 1.2)) | TensorSpline(2, 2.5, 4, (1.0, 0.0, -1.0)) -> graded knots
+TensorSpline(2, 2.5, 4, (-3.0, 0.0, 3.0)) | TensorSpline(2, 2.5, 4, (0.0,)) -> graded knots
 Fourier([0.0], [[1.0]], [[1.0, 2.0]]) -> shape
 solve_balance(*AT, ONES, ONES, 1e-4, start=np.zeros((2, 4))) -> start
 solve_balance(*AT, ONES, ONES, 1e-4, method="magic") -> method
@@ -339,13 +355,13 @@ fitted_friction([[0.1, 0.5, 0.9], [0.2, "rough", 0.9], [0.3, 0.5, 0.9]]) -> samp
 fitted_friction([[0.1, 0.5, 0.9], [0.2, None, 0.9], [0.3, 0.5, 0.9]]) -> sample 2: along is None
 fitted_friction(SAMPLES, length=1.0) -> take both
 fitted_friction(SAMPLES, length=-1.0, period=2.0) -> length
-Problem("x", friction=DRAG, gait=BSpline(6, 1)) -> work depends on the pace under .*; use Harmonic
-Problem("x", friction=DRAG, gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
-Problem("x", friction=PowerLaw(0.5), gait=BSpline(6, 1)) -> work depends on the pace under .*; use Harmonic
-Problem("x", friction=PowerLaw(0.5), gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
+Problem("x", friction=DRAG, gait=BSpline(6, 1)) | Problem("x", friction=DRAG, gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
+Problem("x", friction=PowerLaw(0.5), gait=BSpline(6, 1)) | Problem("x", friction=PowerLaw(0.5), gait=Polygon(6)) -> pace under .*; use Harmonic
 Problem("x", body=Chain((0.5, 0.5)), friction=DRAG, gait=Harmonic(2)) -> scallop theorem
 OwnLaw("vs/speed", "-vn/speed") | OwnLaw("-vs/speed", "-vn/speed + 0.1*vn/speed*exp(speed)") -> does not oppose the motion
-OwnLaw("-vs/speed", "0.1*vn/(1 + speed)") -> does not oppose the motion
+OwnLaw("-vs/speed", "0.1*vn/(1 + speed)") | OwnLaw("1", "-vn/speed") -> does not oppose the motion
+OwnLaw("0", "-vn/speed") -> nothing resists
+OwnLaw("-vs/sqrt(vs**2 + delta**2)", "-vn/sqrt(vn**2 + delta**2)") | OwnLaw("-vs", "-tanh(vn/delta)") -> state a wheel's friction as Axle
 OwnLaw("-vs/abs(vs + 1) - where(vs < 0, 0, 1e-9)", "-vn") -> rest
 OwnLaw("-vs/(speed - speed)", "-vn") -> no finite value
 OwnLaw("-vs/speed", "where(vs > 0, -2, -1.5)*vn/speed") -> jumps where vs changes its sign
@@ -362,8 +378,7 @@ evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=0) -> period must be p
 evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=0.06) -> in the file's unit of time
 evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), harmonics=40) -> 60 samples determine 1 to 28 harmonics
 evaluate(PROBLEM, 0.01 * GAIT.angles(np.arange(60) / 60)) -> hardly moves
-evaluate(PROBLEM, "nowhere.csv") -> cannot read nowhere.csv
-Basis("nowhere.csv") -> cannot read nowhere.csv
+evaluate(PROBLEM, "nowhere.csv") | Basis("nowhere.csv") -> cannot read nowhere.csv
 evaluate(PROBLEM, {"a": 1}) -> gait must be a Fourier, numbers, text, a path or a function
 evaluate(Problem("up", gait=Harmonic(1), grade=0.1), GAIT) -> colloc\.slope_motion
 evaluate(Problem("x", gait=Harmonic(1), froude=Free(0.1, 1.0), objective="efficiency"), GAIT) -> evaluated at one pace
@@ -467,6 +482,7 @@ grade=0.1, body=CrawlerBody() -> only a Chain
 grade=0.1, objective="turning" -> the objective uses the rotation
 grade=0.1, rotation=0.1 -> a body that a cycle turns has no gait that repeats
 grade=0.1, formulation="implicit velocity" -> only the formulation 'full'
+scheme="spline" | scheme="gauss-0" | scheme="gauss-13" | scheme="radau" | scheme=3 | scheme="" -> unknown scheme
 grade=0.1, scheme="trapezoid" -> a gauss-N or radau-N scheme is needed
 grade=0.1, towards="up" -> towards must be a finite angle
 towards=1.0 -> towards is a direction on a slope
@@ -476,12 +492,12 @@ body=Chain(feet=(Foot(0, 0.1), Foot(1), Foot(2))), gait=MIRRORED -> read the sam
 guess=ellipse(1.0, 1e-6, 0.7e-6), gait=MIRRORED | guess=ellipse(0.0, 0.0, 0.0), gait=MIRRORED -> hardly moves
 gait=Polygon(4), guess=Corners(np.array([[0.1, -0.1], [0.0, 0.0]])) -> hardly moves
 guess=ellipse(0.0, 1.0, 2 * np.pi / 3 + 1e-5), gait=MIRRORED -> cross
+guess=ellipse(2.4, 0.3, 0.5), body=Chain(width=0.12), gait=MIRRORED -> links overlap
 guess=ellipse(np.pi - 1, 1.0 + 1e-5, 0.1), gait=MIRRORED -> beyond the limit
 gait=Polygon(8), froude=0.2, torque_limit=0.05 -> infinite where joint rates jump
 friction=Friction(mu_t=-1, mu_f=1, mu_b=1) -> mu_t
 guess=ellipse(0.0, 4.0, 0.8), gait=MIRRORED -> inadmissible: joint
-gait=MIRRORED, intervals=1 | gait=Polygon(6), intervals=8 -> mesh is too small
-body=ModalBody(), gait=Harmonic(1, "antipodal"), intervals=1 -> mesh is too small
+gait=MIRRORED, intervals=1 | gait=Polygon(6), intervals=8 | body=ModalBody(), gait=Harmonic(1, "antipodal"), intervals=1 -> mesh is too small
 guess=Fourier([0], [[1]], [[1]]), gait=MIRRORED -> 1 joints
 gait=Basis([BUMP, BUMP]) -> depend on one another
 gait=Basis([np.exp(np.roll(BUMP, 5))], "bilateral") -> no symmetry 'bilateral'
@@ -504,8 +520,7 @@ body=ModalBody(), gait=Harmonic(1), formulation="full" -> must be one of implici
 body=ModalBody -> body must be a Chain or ModalBody
 body=Wave(), gait=Harmonic() -> leave gait out
 body=Wave(), gait=Prescribed((0.0, 0.25, 1.0)) -> may have the symmetry antipodal
-gait=Prescribed() -> not prescribed
-body=ModalBody(), gait=Prescribed() -> not prescribed
+gait=Prescribed() | body=ModalBody(), gait=Prescribed() -> not prescribed
 body=Wave(amplitude=1.8) -> the tangent reaches 1.8 rad
 """
 

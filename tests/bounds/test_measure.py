@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, ProblemError
+from colloc import Chain, Friction
 from colloc.bounds.motions import Domain
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
 from colloc.bounds.sampled import Budget, compute_bound
@@ -91,12 +91,6 @@ def test_more_knots_lower_the_program(found):
     assert more.intervals == 6
     assert more.graded
     assert more.floor < found[1].floor - 1e-3
-
-
-@pytest.mark.parametrize("knots", [(-1.0, 0.0, 1.2), (1.0, 0.0, -1.0), (-3.0, 0.0, 3.0), (0.0,)])
-def test_knots_that_are_none_are_refused(knots):
-    with pytest.raises(ProblemError, match="graded knots"):
-        TensorSpline(2, LIMIT, 4, knots)
 
 
 def test_graded_splines_hold_every_cubic_exactly():

@@ -43,24 +43,7 @@ def test_splines_add_up_to_one_and_differentiate():
     np.testing.assert_allclose(spline.matrices(q, r)[1] @ coefficients, slope, atol=1e-8)
 
 
-@pytest.mark.parametrize("mirror", [1, -1])
-def test_symmetric_basis_has_its_parities_and_misses_nothing(mirror):
-    spline = TensorSpline(2, np.pi, 4)
-    q, _ = random_points(3, 40)
-    f = spline.symmetric_basis(mirror, -1)
-    at = functions(spline, q) @ f
-    np.testing.assert_allclose(
-        (functions(spline, -q) @ f).toarray(), mirror * at.toarray(), atol=1e-12
-    )
-    np.testing.assert_allclose(
-        (functions(spline, -q[::-1]) @ f).toarray(), -at.toarray(), atol=1e-12
-    )
-    sizes = [spline.symmetric_basis(a, b).shape[1] for a in (1, -1) for b in (1, -1)]
-    assert sum(sizes) == spline.size
-    assert np.linalg.matrix_rank(f.toarray()) == f.shape[1]
-
-
-@pytest.mark.parametrize(("n_joint", "together"), [(3, 1), (3, 2), (4, 2)])
+@pytest.mark.parametrize(("n_joint", "together"), [(2, 2), (3, 1), (3, 2), (4, 2)])
 def test_sums_over_few_joints_have_no_mixed_difference_in_more_and_miss_nothing(n_joint, together):
     spline, rng = TensorSpline(n_joint, 2.0, 2), np.random.default_rng(31)
     bases = {(a, b): spline.symmetric_basis(a, b, together) for a in (1, -1) for b in (1, -1)}
@@ -76,7 +59,7 @@ def test_sums_over_few_joints_have_no_mixed_difference_in_more_and_miss_nothing(
         )
         assert np.linalg.matrix_rank(basis.toarray()) == basis.shape[1]
         moved, difference = rng.uniform(-2, 2, q.shape), 0.0
-        for corner in product((0, 1), repeat=together + 1):
+        for corner in product((0, 1), repeat=together + 1) if together < n_joint else ():
             moves = np.append(corner, np.zeros(n_joint - together - 1))[:, None] > 0
             mixed = np.where(moves, moved, q)
             difference = (

@@ -10,12 +10,10 @@ from colloc import Axle, Chain, Elliptic, Friction, ModalBody, OwnLaw, PowerLaw,
 from colloc.gaits.gait_fields import LAWS, fields, part_from
 from colloc.mechanics.balance import balance_jacobian, instant
 from colloc.mechanics.fixed_point import motion_and_derivatives
-from colloc.mechanics.friction import ClosedForm, line_integrals
+from colloc.mechanics.friction import line_integrals
 from colloc.mechanics.law import Law
-from colloc.mechanics.native_kernel import native_kernel
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.smooth_body import accurate_motion
-from tests.shared.without_kernel import numpy_instead
 
 LENGTHS = Chain().length_column()
 WEAKER = "/speed * (1 + 0.5*exp(-speed))"
@@ -94,12 +92,6 @@ def test_the_secant_of_formulas_that_are_dry_in_each_direction_does_not_vanish()
     secant, force = law.density_secant(vs, vn, 1e-4), law.density(vs, vn, 1e-4)
     for k, v in enumerate((vs, vn)):
         assert (secant[k][k] * v > -0.7 * force[k]).all()
-
-
-@pytest.mark.parametrize(("along", "why"), [("0", "nothing resists"), ("1", "does not oppose")])
-def test_a_formula_without_variables_is_refused_for_what_it_does(along, why):
-    with pytest.raises(ValueError, match=why):
-        OwnLaw(along, "-vn/speed")
 
 
 @each
@@ -228,28 +220,6 @@ def test_smooth_bodies_obey_any_law_whatever_solver_they_are_asked_by(law):
     np.testing.assert_allclose(replayed.power, solved.power, rtol=5e-3)
     for motion in (solved, replayed):
         np.testing.assert_allclose(motion.actuator_power, motion.power, rtol=1e-6)
-
-
-def test_coulomb_friction_costs_what_it_did_and_keeps_its_digits(monkeypatch):
-    """The kernel treats it alone; no law is asked in Python but for its coefficients."""
-    angles, rates = np.array([[0.5, -1.2], [0.2, 0.7]]), np.array([[1.0, 0.3], [-2.0, 1.5]])
-    law, body = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), Chain()
-    expected = [  # before other laws were known
-        [0.0111061444960639, 0.0153392649399081],
-        [0.0299279046686109, 0.1135819154364744],
-        [-0.2696918937274128, -0.5554178355603785],
-    ]
-    with numpy_instead():
-        by_numpy = body.solve(law, angles, rates, 1e-4).require()
-    np.testing.assert_allclose(by_numpy.z, expected, rtol=1e-12)
-    if native_kernel() is not None:
-        for name in ("force", "jacobian", "secant", "potential"):
-            monkeypatch.delattr(ClosedForm, name)
-        monkeypatch.delattr(Friction, "density")
-        compiled = body.solve(law, angles, rates, 1e-4).require()
-        np.testing.assert_allclose(compiled.z, expected, rtol=1e-12)
-        slopes = motion_and_derivatives(body, law, angles, rates, 1e-4, compiled)[1]
-        assert slopes.shape == (6, 4, 2)
 
 
 def test_viscous_motion_is_linear_in_the_rates():

@@ -21,6 +21,7 @@ def test_traits_are_found_from_samples():
     assert (drag.degree, drag.reversible, drag.regularised) == (1.0, True, False)
     weaker = OwnLaw("-vs/speed*(1 + exp(-speed))", "-vn/speed*(1 + exp(-speed))")
     assert (weaker.degree, weaker.reversible) == (None, True)
+    assert OwnLaw("-0.3*tanh(100*vs)", "-tanh(100*vn)").degree is None
     assert weaker.smallest == pytest.approx(1 + np.exp(-1))
 
 

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Harmonic, Problem, ProblemError, ellipse, solve
+from colloc import Chain, Fourier, Harmonic, Problem, ellipse, solve
 from colloc.bounds.motions import admissible
 from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics.contact import (
@@ -162,17 +162,6 @@ def test_links_of_equal_lengths_but_for_rounding_fold_up_like_equal_ones():
     np.testing.assert_allclose(*alike, atol=1e-12)
 
 
-@pytest.mark.parametrize("order", [1, -1])
-def test_how_deep_an_end_passes_through_a_link_is_its_smaller_distance_before_and_after(order):
-    """The head of three equal links is (sin a + sin(a + b))/3 beside the first one's line."""
-    steps = np.array([-0.2, -0.1, -0.05, 0.02, 0.1, 0.2])[::order]
-    angles = np.stack([np.full(6, 2.0), 2 * np.pi - 4.0 + steps])
-    height = np.abs(np.sin(2.0) + np.sin(angles.sum(axis=0))) / 3
-    smallest = height[np.abs(steps) == 0.02].item()
-    assert passing_depth(Chain(), angles) == pytest.approx(smallest, rel=1e-12)
-    assert passing_depth(Chain(), angles[:, :3]) == 0.0
-
-
 def test_links_pass_each_other_where_any_end_changes_its_side_beside_another_link():
     """Of a body that moves by steps between random shapes."""
     body, rng, depths = Chain((0.2, 0.1, 0.3, 0.15, 0.25)), np.random.default_rng(9), []
@@ -254,18 +243,6 @@ def test_without_a_width_nothing_is_different():
     wide = Problem("strips", body=Chain(width=0.02))
     assert wide.hash != Problem("strips").hash
     assert Problem.from_dict(wide.to_dict()).body == Chain(width=0.02)
-
-
-@pytest.mark.parametrize("width", [-0.01, 1 / 3, np.nan, np.inf, True, "thick", None])
-def test_a_width_is_less_than_the_shortest_link(width):
-    with pytest.raises(ProblemError, match="width"):
-        Chain(width=width)
-
-
-def test_a_guess_that_overlaps_is_refused():
-    guess = ellipse(A0=2.4, A1=0.3, B1=0.5)
-    with pytest.raises(ProblemError, match="links overlap"):
-        Problem("thick", guess, Chain(width=0.12), gait=Harmonic(1, "bilateral"))
 
 
 def test_the_best_folded_gait_keeps_its_width_and_pays_for_it():

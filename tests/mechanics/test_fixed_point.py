@@ -6,7 +6,7 @@ import pytest
 from shared.instants import random_instants, random_loads
 
 from benchmarks.zoo import feet_problem
-from colloc import Chain, Friction, NotConvergedError, ProblemError, solve_balance
+from colloc import Chain, Friction, NotConvergedError, solve_balance
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.solution_branches import all_balanced_velocities
 
@@ -132,16 +132,6 @@ def test_all_motions_under_a_load_are_balanced_and_counted_by_their_signs():
             Chain(), law, angles[:, at], rates[:, at], 1e-4, load=load[:, at], start=z[:, at]
         )
         np.testing.assert_allclose(stays.z, z[:, at], atol=1e-6)
-
-
-def test_a_body_with_shape_coordinates_of_its_own_is_not_taken_for_its_joints():
-    """The kernel would read joint angles that nobody gave."""
-
-    class Belt(Chain):
-        n_joint = 1
-
-    with pytest.raises(ProblemError, match="not its 2 joints"):
-        solve_balance(Belt(), Friction(), *random_instants(5, n_joint=1), 1e-3)
 
 
 def test_a_load_in_whole_numbers_counts_as_they_do():

@@ -12,7 +12,6 @@ from colloc import (
     Chain,
     Foot,
     Friction,
-    OwnLaw,
     Pad,
     Problem,
     ProblemError,
@@ -271,12 +270,6 @@ def test_rolling_fast_takes_nothing_from_what_holds_sideways():
         np.testing.assert_allclose(force, [-0.02 * one, -one])
 
 
-@pytest.mark.parametrize(("mu", "name"), [(0.0, "rolling"), (-1.0, "sideways")])
-def test_coefficients_are_positive(mu, name):
-    with pytest.raises(colloc.ProblemError, match=name):
-        Axle(**{name: mu})
-
-
 @pytest.mark.parametrize("wheel", [{"rolling": 1e-7}, {"rolling": 1.0, "sideways": 1e7}], ids=str)
 def test_wheels_that_roll_freely_or_hold_firmly_do_not_slip(wheel):
     """To rolling over sideways friction times delta, and not times the speed: it is nonholonomic at
@@ -287,17 +280,6 @@ def test_wheels_that_roll_freely_or_hold_firmly_do_not_slip(wheel):
     z = colloc.solve_balance(body, Friction(), angles, rates, 1e-3).require().z
     known = [wheels_that_do_not_slip(body, *at) for at in zip(angles.T, rates.T, strict=True)]
     np.testing.assert_allclose(z, np.transpose(known), atol=1e-8)
-
-
-def test_formulas_that_are_dry_in_each_direction_are_refused_for_an_axle():
-    for along, across in (
-        ("-0.3*vs/sqrt(vs**2 + delta**2)", "-vn/sqrt(vn**2 + delta**2)"),
-        ("-vs", "-tanh(vn/delta)"),
-    ):
-        with pytest.raises(colloc.ProblemError, match=r"state a wheel's friction as Axle"):
-            OwnLaw(along, across)
-    assert OwnLaw("-0.3*vs", "-vn").degree == 1.0
-    assert OwnLaw("-0.3*tanh(100*vs)", "-tanh(100*vn)").degree is None
 
 
 def replayed(gait, rolling, n=1000):

@@ -142,14 +142,6 @@ def test_a_collocated_period_is_the_one_that_is_followed_from_instant_to_instant
         assert collocated[name] == pytest.approx(followed.values[name], abs=2e-5)
 
 
-def test_slower_and_slower_it_is_the_slow_motion_on_a_slope_to_first_order():
-    slow, off = motion_of(uphill(froude=0.0)), []
-    for froude in (4e-4, 2e-4):
-        motion, v = motion_of(uphill(froude=froude))
-        off.append(motion.values(v, DELTA)["distance"] - slow[0].values(v, DELTA)["distance"])
-    assert off[0] / off[1] == pytest.approx(2.0, abs=0.1)
-
-
 def test_the_flatter_the_slope_the_nearer_it_is_to_the_level():
     level, flat = replayed(), replayed(grade=1e-9)
     assert flat.work == pytest.approx(level.work, rel=1e-5)
