@@ -355,8 +355,8 @@ fitted_friction([[0.1, 0.5, 0.9], [0.2, "rough", 0.9], [0.3, 0.5, 0.9]]) -> samp
 fitted_friction([[0.1, 0.5, 0.9], [0.2, None, 0.9], [0.3, 0.5, 0.9]]) -> sample 2: along is None
 fitted_friction(SAMPLES, length=1.0) -> take both
 fitted_friction(SAMPLES, length=-1.0, period=2.0) -> length
-Problem("x", friction=DRAG, gait=BSpline(6, 1)) | Problem("x", friction=DRAG, gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
-Problem("x", friction=PowerLaw(0.5), gait=BSpline(6, 1)) | Problem("x", friction=PowerLaw(0.5), gait=Polygon(6)) -> pace under .*; use Harmonic
+Problem("x", friction=DRAG, gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
+Problem("x", friction=PowerLaw(0.5), gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
 Problem("x", body=Chain((0.5, 0.5)), friction=DRAG, gait=Harmonic(2)) -> scallop theorem
 OwnLaw("vs/speed", "-vn/speed") | OwnLaw("-vs/speed", "-vn/speed + 0.1*vn/speed*exp(speed)") -> does not oppose the motion
 OwnLaw("-vs/speed", "0.1*vn/(1 + speed)") | OwnLaw("1", "-vn/speed") -> does not oppose the motion
@@ -401,12 +401,12 @@ Harmonic(0) | Harmonic(1.5) -> harmonics
 Harmonic(symmetry="mirror") -> symmetry
 Harmonic(2).member(np.full(9, 1e308), 2) -> must be a finite
 BSpline(4) -> from degree
-BSpline(1, 1) -> knots
+BSpline(1, 2) -> knots
 BSpline(9, symmetry="antipodal") -> even number of knots
-BSpline(8, degree=0) -> degree must be 1, 2, 3, 4 or 5
+BSpline(8, degree=0) -> degree must be 2, 3, 4 or 5
 Basis([np.arange(96.0)]) -> too rough
 Basis([np.ones(48)]) -> nothing would move
-Basis([np.sin(np.arange(n) * 2 * np.pi / n) for n in (96, 48)]) -> must be alike
+Basis([np.sin(np.arange(n) * 2 * np.pi / n) for n in (96, 48)]) -> all alike
 Basis([np.ones(5)]) -> at least 24
 Basis(3) -> a sequence of columns
 Polygon(1) -> corners

@@ -45,11 +45,6 @@ SUBCOMMANDS = {
     "sensitivity": ("results", "how the best value changes with friction, lengths, feet, limits"),
 }
 """Name to module of this package, with a function of that name, and what the command does."""
-_ELSEWHERE = {
-    "open": "an archive of starts is opened by: colloc multistart ARCHIVE.h5 --start N",
-    "compare": "results are compared by: colloc verify A.h5 --compare B.h5",
-    "referee": "the table of known gaits is a benchmark: python -m benchmarks.referee, in a clone",
-}
 _EXAMPLE = """\
 From a problem to a page to send:
 
@@ -97,8 +92,6 @@ def _run(words: list[str]) -> int:
     if name in SUBCOMMANDS:
         module = importlib.import_module(f"colloc.commands.{SUBCOMMANDS[name][0]}")
         return getattr(module, name)(words[1:])
-    if name in _ELSEWHERE:
-        raise ProblemError(f"{_ELSEWHERE[name]}.")
     import difflib
 
     hints = [f"solve {name}"] if name.endswith(".py") else []

@@ -157,14 +157,6 @@ class Splines(LinearClass):
     series = series_of
 
     @property
-    def relative_delta(self) -> bool:  # type: ignore[override]
-        return self.degree == 1
-
-    @property
-    def delta_start(self) -> float | None:  # type: ignore[override]
-        return DELTA_START if self.relative_delta else None
-
-    @property
     def harmonics(self) -> int:  # type: ignore[override]
         return self.knots // 2
 
@@ -178,13 +170,6 @@ class Splines(LinearClass):
         since = (self.knots * t - knots - self.first_knot + 0.5 * width) % self.knots
         values = self.knots**derivative * np.nan_to_num(one(since, nu=derivative), nan=0.0)
         return np.where(since < width, values, 0.0)
-
-    @property
-    def instants(self) -> np.ndarray:
-        if not self.relative_delta:
-            return super().instants
-        n = _INSTANTS * self.knots
-        return np.arange(n) / n
 
     @property
     def _smooth(self) -> Harmonic:
@@ -202,105 +187,6 @@ class Splines(LinearClass):
         by = self.parameters(self._smooth.perturb(straight, step, fall, rng))
         return self.member(self.parameters(self.through(gait)) + by, gait.n_joint)
 
-    # polygons
-    @property
-    def pieces(self) -> np.ndarray:
-        if not self.relative_delta:
-            return super().pieces
-        corners = (np.arange(self.knots + 1) + self.first_knot) / self.knots
-        inner = corners[(corners > _AT_A_CORNER) & (corners < self.fraction - _AT_A_CORNER)]
-        return np.concatenate([[0.0], inner, [self.fraction]])
-
-    def intervals(self, n_joint: int) -> int:
-        if not self.relative_delta:
-            return super().intervals(n_joint)
-        return max(_INTERVALS, _A_SIDE * (self.pieces.size - 1))
-
-    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
-        if not self.relative_delta:
-            return super().fewest_intervals(per_interval)
-        return 2 * (self.pieces.size - 1), "the sides"
-
-    def rates_on(self, mesh: Mesh, n_joint: int) -> np.ndarray:
-        times = mesh.times
-        if self.relative_delta:
-            times = np.empty(mesh.n_point)
-            times[mesh.points] = (mesh.edges[:-1] + 0.5 * mesh.h)[:, None]
-        return self.angle_matrix(times, n_joint, 1)
-
-    def side_rates(self, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
-        """Fraction of the time of each side, and joint rates on it per parameter."""
-        middles = 0.5 * (self.pieces[1:] + self.pieces[:-1])
-        return np.diff(self.pieces) / self.pieces[-1], self.angle_matrix(middles, n_joint, 1)
-
-    def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
-        return super().member(parameters, n_joint)
-
-    def member(self, parameters: np.ndarray, n_joint: int) -> Any:
-        gait = self.trajectory(parameters, n_joint)
-        if not self.relative_delta:
-            return gait
-        vertices = gait.angles(self.pieces)
-        return Corners(vertices[:, :-1] if self.symmetry == NONE else vertices, self.symmetry)
-
-    def _has_corners_of(self, gait: Any) -> bool:
-        alike = isinstance(gait, Corners) and gait.symmetry == self.symmetry
-        return alike and gait.phases.size == self.pieces.size
-
-    def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
-        return np.interp(times, self.pieces, gait.phases) if self.relative_delta else times
-
-    def times(self, gait: Any, phases: np.ndarray) -> np.ndarray:
-        if not self.relative_delta:
-            return phases
-        corners, edges = self.pieces, phases
-        if self._has_corners_of(gait):
-            edges = np.interp(phases, gait.phases, corners)
-        apart = np.abs(edges[:, None] - corners).min(axis=1)
-        return np.union1d(edges[apart > _AT_A_CORNER], corners)
-
-    def project(self, gait: Any) -> np.ndarray:
-        if not self.relative_delta or getattr(gait, "basis", None) == self:
-            return super().project(gait)
-        times = self.pieces
-        if self._has_corners_of(gait):
-            points = gait.vertices
-        else:  # on the path, evenly in arc length
-            samples = symmetric_samples(gait, self.symmetry)
-            steps = np.linalg.norm(np.diff(samples), axis=0)
-            along = np.concatenate([[0.0], np.cumsum(steps)])
-            even = np.linspace(0.0, along[-1], _POINTS)
-            path = np.stack([np.interp(even, along, row) for row in samples])
-            points = path[:, _best_corners(path, times.size - 1)]
-        knots = self.knots * times - self.first_knot
-        corners = np.abs(knots - np.round(knots)) < _AT_A_CORNER  # others are middles of sides
-        matrix = self.angle_matrix(times[corners], gait.n_joint)
-        values = points[:, corners].T.ravel()
-        return np.linalg.lstsq(matrix.reshape(values.size, -1), values, rcond=None)[0]
-
-
-def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
-    """Indices of ``pieces + 1`` points whose chords are nearest to all (dynamic programming)."""
-    n = points.shape[1]
-    cost, before = np.full((n, n), np.inf), np.triu(np.ones((n, n)), 1)
-    for i in range(n - 1):
-        # the chord from point i to each later one, and all points between
-        seen = points[:, i + 1 :] - points[:, i : i + 1]
-        dots, squares = seen.T @ seen, np.sum(seen**2, axis=0)
-        along = np.clip(dots / np.maximum(squares, 1e-300), 0.0, 1.0)
-        nearer = along * (2 * dots - along * squares)
-        between = before[: n - i - 1, : n - i - 1]
-        cost[i, i + 1 :] = np.cumsum(squares) - squares - np.einsum("kj,kj->j", nearer, between)
-    best, back = cost[0].copy(), []
-    for _ in range(pieces - 1):
-        total = best[:, None] + cost
-        back.append(np.argmin(total, axis=0))
-        best = np.min(total, axis=0)
-    chosen = [n - 1]
-    for step in reversed(back):
-        chosen.append(int(step[chosen[-1]]))
-    return np.array([0, *chosen[::-1]])
-
 
 @named_arguments
 @dataclass(frozen=True)
@@ -313,8 +199,8 @@ class BSpline(Splines):
         In a cycle, evenly spaced, each with a coefficient for every joint; more than the degree,
         64 at most, and an even number for antipodal gaits.
     degree : int
-        Of the polynomials between knots, 1 to 5; its derivatives below the degree are continuous.
-        Those of degree 1 are polygons, see `Polygon`.
+        Of the polynomials between knots, 2 to 5; derivatives below the degree are continuous.
+        Splines of degree 1 are polygons, see `Polygon`.
     symmetry : {"none", "bilateral", "antipodal"}
 
     Raises
@@ -336,8 +222,10 @@ class BSpline(Splines):
     symmetry: str = "none"
 
     def __post_init__(self) -> None:
-        if not is_whole(self.degree, 1, 5):
-            raise ProblemError(f"gait.degree must be 1, 2, 3, 4 or 5, not {self.degree!r}.")
+        if not is_whole(self.degree, 2, 5):
+            raise ProblemError(
+                f"gait.degree must be 2, 3, 4 or 5 (Polygon has 1), not {self.degree!r}."
+            )
         if not is_whole(self.knots, self.degree + 1, 64):
             raise ProblemError(
                 f"gait.knots must be an integer from degree + 1 = {self.degree + 1} to 64, not "
@@ -385,6 +273,7 @@ class Polygon(Splines):
     axis: str = "corner"
 
     degree = 1
+    relative_delta, delta_start = True, DELTA_START
 
     def __post_init__(self) -> None:
         if not is_whole(self.corners, 2, 64):
@@ -414,3 +303,93 @@ class Polygon(Splines):
     def describe(self) -> str:
         axis = f" through a {self.axis}" if self._has_axis else ""
         return f"polygons of {self.corners} corners, symmetry {self.symmetry}{axis}"
+
+    @property
+    def instants(self) -> np.ndarray:
+        n = _INSTANTS * self.knots
+        return np.arange(n) / n
+
+    @property
+    def pieces(self) -> np.ndarray:
+        corners = (np.arange(self.knots + 1) + self.first_knot) / self.knots
+        inner = corners[(corners > _AT_A_CORNER) & (corners < self.fraction - _AT_A_CORNER)]
+        return np.concatenate([[0.0], inner, [self.fraction]])
+
+    def intervals(self, n_joint: int) -> int:
+        return max(_INTERVALS, _A_SIDE * (self.pieces.size - 1))
+
+    def fewest_intervals(self, per_interval: int) -> tuple[int, str]:
+        return 2 * (self.pieces.size - 1), "the sides"
+
+    def rates_on(self, mesh: Mesh, n_joint: int) -> np.ndarray:
+        middles = np.empty(mesh.n_point)
+        middles[mesh.points] = (mesh.edges[:-1] + 0.5 * mesh.h)[:, None]
+        return self.angle_matrix(middles, n_joint, 1)
+
+    def side_rates(self, n_joint: int) -> tuple[np.ndarray, np.ndarray]:
+        """Fraction of the time of each side, and joint rates on it per parameter."""
+        middles = 0.5 * (self.pieces[1:] + self.pieces[:-1])
+        return np.diff(self.pieces) / self.pieces[-1], self.angle_matrix(middles, n_joint, 1)
+
+    def trajectory(self, parameters: np.ndarray, n_joint: int) -> Any:
+        return super().member(parameters, n_joint)
+
+    def member(self, parameters: np.ndarray, n_joint: int) -> Corners:
+        vertices = self.trajectory(parameters, n_joint).angles(self.pieces)
+        return Corners(vertices[:, :-1] if self.symmetry == NONE else vertices, self.symmetry)
+
+    def _has_corners_of(self, gait: Any) -> bool:
+        alike = isinstance(gait, Corners) and gait.symmetry == self.symmetry
+        return alike and gait.phases.size == self.pieces.size
+
+    def phases(self, gait: Any, times: np.ndarray) -> np.ndarray:
+        return np.interp(times, self.pieces, gait.phases)
+
+    def times(self, gait: Any, phases: np.ndarray) -> np.ndarray:
+        corners, edges = self.pieces, phases
+        if self._has_corners_of(gait):
+            edges = np.interp(phases, gait.phases, corners)
+        apart = np.abs(edges[:, None] - corners).min(axis=1)
+        return np.union1d(edges[apart > _AT_A_CORNER], corners)
+
+    def project(self, gait: Any) -> np.ndarray:
+        if getattr(gait, "basis", None) == self:
+            return super().project(gait)
+        times = self.pieces
+        if self._has_corners_of(gait):
+            points = gait.vertices
+        else:  # on the path, evenly in arc length
+            samples = symmetric_samples(gait, self.symmetry)
+            steps = np.linalg.norm(np.diff(samples), axis=0)
+            along = np.concatenate([[0.0], np.cumsum(steps)])
+            even = np.linspace(0.0, along[-1], _POINTS)
+            path = np.stack([np.interp(even, along, row) for row in samples])
+            points = path[:, _best_corners(path, times.size - 1)]
+        knots = self.knots * times - self.first_knot
+        corners = np.abs(knots - np.round(knots)) < _AT_A_CORNER  # others are middles of sides
+        matrix = self.angle_matrix(times[corners], gait.n_joint)
+        values = points[:, corners].T.ravel()
+        return np.linalg.lstsq(matrix.reshape(values.size, -1), values, rcond=None)[0]
+
+
+def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
+    """Indices of ``pieces + 1`` points whose chords are nearest to all (dynamic programming)."""
+    n = points.shape[1]
+    cost, before = np.full((n, n), np.inf), np.triu(np.ones((n, n)), 1)
+    for i in range(n - 1):
+        # the chord from point i to each later one, and all points between
+        seen = points[:, i + 1 :] - points[:, i : i + 1]
+        dots, squares = seen.T @ seen, np.sum(seen**2, axis=0)
+        along = np.clip(dots / np.maximum(squares, 1e-300), 0.0, 1.0)
+        nearer = along * (2 * dots - along * squares)
+        between = before[: n - i - 1, : n - i - 1]
+        cost[i, i + 1 :] = np.cumsum(squares) - squares - np.einsum("kj,kj->j", nearer, between)
+    best, back = cost[0].copy(), []
+    for _ in range(pieces - 1):
+        total = best[:, None] + cost
+        back.append(np.argmin(total, axis=0))
+        best = np.min(total, axis=0)
+    chosen = [n - 1]
+    for step in reversed(back):
+        chosen.append(int(step[chosen[-1]]))
+    return np.array([0, *chosen[::-1]])

@@ -152,25 +152,22 @@ def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
     try:
         arrays = [np.array(each(phases) if callable(each) else each, float) for each in columns]
     except (TypeError, ValueError):
+        arrays = []
+    if len({each.shape for each in arrays}) != 1 or arrays[0].ndim not in (1, 2):
         raise ProblemError(
-            "gait.columns must be a sequence of columns: samples over a cycle, or functions of "
-            "the phase."
-        ) from None
-    shapes = {each.shape for each in arrays}
-    if len(shapes) != 1 or arrays[0].ndim not in (1, 2):
-        raise ProblemError(
-            "gait.columns must be alike: each (n_time,), or each (n_joint, n_time), with as many "
-            "samples."
+            "gait.columns must be a sequence of columns, samples over a cycle or functions of the "
+            "phase, all alike: (n_time,) or (n_joint, n_time)."
         )
     values = np.array(arrays)
+    what = ""
     if values.shape[-1] < _FEWEST:
-        raise ProblemError(
-            f"gait.columns have {values.shape[-1]} samples of a cycle: give at least {_FEWEST}."
-        )
-    if not np.isfinite(values).all():
-        raise ProblemError("gait.columns must be finite numbers.")
-    if np.ptp(values, axis=-1).max() == 0:
-        raise ProblemError("gait.columns do not change over time: nothing would move.")
+        what = f"have {values.shape[-1]} samples of a cycle: give at least {_FEWEST}"
+    elif not np.isfinite(values).all():
+        what = "must be finite numbers"
+    elif np.ptp(values, axis=-1).max() == 0:
+        what = "do not change over time: nothing would move"
+    if what:
+        raise ProblemError(f"gait.columns {what}.")
     if values.ndim == 2:
         return tuple(map(tuple, values.tolist()))
     return tuple(tuple(map(tuple, column)) for column in values.tolist())

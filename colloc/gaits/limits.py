@@ -19,7 +19,7 @@ def checked_limit(body: Body, limit: Any) -> Limit:
     if isinstance(limit, np.ndarray) and limit.ndim == 0:
         limit = limit.item()
     if not isinstance(limit, (tuple, list, np.ndarray)):
-        return _checked_number(body, limit)
+        return _checked_joint(body, limit)
     each = tuple(_checked_joint(body, joint) for joint in limit)
     if len(each) != body.n_joint or len(body.bounded_angles.names) != body.n_joint:
         raise ProblemError(
@@ -30,26 +30,22 @@ def checked_limit(body: Body, limit: Any) -> Limit:
 
 
 def _checked_joint(body: Body, limit: Any) -> Any:
-    if np.ndim(limit) == 0:
-        return _checked_number(body, limit)
-    pair, largest = _numbers(limit), body.defaults.largest_limit
-    if len(pair) != 2:
-        raise ProblemError(
-            f"joint_limit of a joint is a number, or its least and its largest angle, not "
-            f"{limit!r}."
-        )
-    if pair[0] == -pair[1]:
-        return _checked_number(body, pair[1])
-    if not -largest - 1e-12 <= pair[0] < 0 < pair[1] <= largest + 1e-12:
-        raise ProblemError(
-            f"joint_limit {pair!r} must go from a negative to a positive angle in radians, neither "
-            f"beyond {largest:.4g}: the straight body has to lie between."
-        )
-    return pair
-
-
-def _checked_number(body: Body, limit: Any) -> float:
     largest = body.defaults.largest_limit
+    if np.ndim(limit):
+        pair = _numbers(limit)
+        if len(pair) != 2:
+            raise ProblemError(
+                f"joint_limit of a joint is a number, or its least and its largest angle, not "
+                f"{limit!r}."
+            )
+        if pair[0] != -pair[1]:
+            if -largest - 1e-12 <= pair[0] < 0 < pair[1] <= largest + 1e-12:
+                return pair
+            raise ProblemError(
+                f"joint_limit {pair!r} must go from a negative to a positive angle in radians, "
+                f"neither beyond {largest:.4g}: the straight body has to lie between."
+            )
+        limit = pair[1]
     if not is_number(limit) or not 0 < limit <= largest + 1e-12:
         most = f"pi/{np.pi / largest:g}".removesuffix("/1")
         shown = f"{limit:g}" if is_number(limit) else repr(limit)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from colloc.mechanics.densities import INTEGRALS, Quantity, quantities_of
-from colloc.numerics.expression import formula
+from colloc.numerics.expression import Formula, formula
 from colloc.system.arguments import is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
 
@@ -80,14 +80,14 @@ class Objective:
         except (ProblemError, TypeError) as error:
             known = f"It may be one of {', '.join(NAMED)}, or a formula like 'distance / work'."
             raise ProblemError(f"objective: {error} {known}") from None
-        if not stated.names & {*self._names}:
+        names = {expression: name for name, expression in NAMED.items()}
+        object.__setattr__(self, "expression", stated.text)
+        object.__setattr__(self, "name", self.name or names.get(stated.text, stated.text))
+        if not self.uses:
             raise ProblemError(
                 f"the objective {stated.text!r} uses no quantity of a gait; it may use "
                 f"{', '.join(self._names)}."
             )
-        names = {expression: name for name, expression in NAMED.items()}
-        object.__setattr__(self, "expression", stated.text)
-        object.__setattr__(self, "name", self.name or names.get(stated.text, stated.text))
         try:
             with np.errstate(all="ignore"):
                 values = [self(sample) for sample in self._samples]
@@ -110,8 +110,12 @@ class Objective:
 
     def __call__(self, period: Mapping[str, Any]) -> Any:
         """The value for quantities of a cycle: floats or CasADi's symbols."""
-        value = formula(self.expression, self._names)(period)
+        value = self._formula(period)
         return float(value) if isinstance(value, np.ndarray) else value
+
+    @property
+    def _formula(self) -> Formula:
+        return formula(self.expression, self._names)
 
     @property
     def _integrals(self) -> dict[str, Quantity]:
@@ -129,8 +133,7 @@ class Objective:
     @cached_property
     def uses(self) -> tuple[str, ...]:
         """Names of its variables, in the order of `QUANTITIES`, its own last."""
-        stated = formula(self.expression, self._names).names
-        return tuple(name for name in self._names if name in stated)
+        return tuple(name for name in self._names if name in self._formula.names)
 
     @cached_property
     def integrals(self) -> tuple[Quantity, ...]:
@@ -161,8 +164,7 @@ class Objective:
 
     def partials(self, period: Mapping[str, float]) -> dict[str, float]:
         """Derivative with respect to each of its variables."""
-        stated = formula(self.expression, self._names)
-        partials = stated.partials({name: period[name] for name in self.uses})
+        partials = self._formula.partials({name: period[name] for name in self.uses})
         return {name: float(partials[name]) for name in self.uses}
 
     def shares(self, period: Mapping[str, float]) -> dict[str, float]:

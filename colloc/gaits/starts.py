@@ -236,8 +236,11 @@ def _with_amplitude(problem: Any, gait: Any, fraction: float) -> Any:
     return member.scaled(fraction * largest) if np.isfinite(largest) else member
 
 
-def perturbed_gait(problem: Any, seed: int, start: int) -> Any:
-    """Start near the guess: its coefficients move by normals, and it shrinks to be admissible."""
+def start_gait(problem: Any, sampler: str, seed: int, start: int) -> Any:
+    """Start number `start`; with the sampler "perturbed" near the guess, whose coefficients move by
+    normals."""
+    if sampler != PERTURBED:
+        return latin_hypercube_gait(problem, seed, start)
     rng = np.random.default_rng([seed, start])
     for _ in range(_ATTEMPTS):
         member = problem.gait.start_class.perturb(problem.guess, _SPREAD, 0, rng)
@@ -245,10 +248,6 @@ def perturbed_gait(problem: Any, seed: int, start: int) -> Any:
         if gait.shape_speed > _CLEARLY_MOVING * problem.smallest_shape_speed:
             return gait
     raise ProblemError(f"found no admissible start within {_SPREAD:g} rad of the guess.")
-
-
-def start_gait(problem: Any, sampler: str, seed: int, start: int) -> Any:
-    return (perturbed_gait if sampler == PERTURBED else latin_hypercube_gait)(problem, seed, start)
 
 
 def to_body(gait: Any, body: Chain, other: Body, joint_limit: Limit = float(np.pi)) -> Any:

@@ -125,8 +125,7 @@ def fitted_friction(
     if length is not None and period is not None:
         check_finite(positive=True, length=length, period=period)
         scale = length / period
-    v_s = _stribeck_speed(speed, coefficients)
-    fits = [_fit(speed, mu, v_s)[1] for mu in coefficients]
+    v_s, fits = _fit_all(speed, coefficients)
     off = np.array([_basis(speed, v_s) @ fit for fit in fits]) - coefficients
     largest = float(np.abs(off).max())
     if largest > _ROUGH * coefficients.max():
@@ -145,10 +144,11 @@ def _law(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnLaw:
     if not any(fit[1:].any() for fit in fits):
         along, across, back = (fit[0] for fit in fits)
         return Friction(mu_t=across, mu_f=along, mu_b=back)
-    terms = ([*zip(_TERMS, fit, strict=True)] for fit in fits)
     along, across, back = (
-        " + ".join(term.format(f"{c:.6g}", f"{v_s:.6g}") for term, c in each if c > 0)
-        for each in terms
+        " + ".join(
+            term.format(f"{c:.6g}", f"{v_s:.6g}") for term, c in zip(_TERMS, fit, strict=True) if c
+        )
+        for fit in fits
     )
     if back != along:
         along = f"where(vs > 0, {along}, {back})"
@@ -207,8 +207,7 @@ def _check(name: str, speed: np.ndarray, coefficients: np.ndarray) -> None:
         which, k = np.argwhere(coefficients <= 0)[0]
         what = (
             f"sample {k + 1}: the coefficient {tuple(_NAMES)[1 + which]} is "
-            f"{coefficients[which, k]:g}; it has to be positive, else friction would give energy "
-            f"to the body"
+            f"{coefficients[which, k]:g}, and must be positive"
         )
     if what:
         raise ProblemError(f"{name}: {what}.")
@@ -237,8 +236,8 @@ def _fit(speed: np.ndarray, mu: np.ndarray, v_s: float) -> tuple[float, np.ndarr
     return best, coefficients
 
 
-def _stribeck_speed(speed: np.ndarray, coefficients: np.ndarray) -> float:
-    """The v_S of the best fits in all directions."""
+def _fit_all(speed: np.ndarray, coefficients: np.ndarray) -> tuple[float, list[np.ndarray]]:
+    """The best v_S, and the coefficients of the terms in all directions."""
 
     def score(log_speed: float) -> float:
         return sum(_fit(speed, mu, np.exp(log_speed))[0] for mu in coefficients)
@@ -249,4 +248,5 @@ def _stribeck_speed(speed: np.ndarray, coefficients: np.ndarray) -> float:
     found = minimize_scalar(
         score, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-10}
     )
-    return float(np.exp(found.x if found.fun < score(best) else best))
+    v_s = float(np.exp(found.x if found.fun < score(best) else best))
+    return v_s, [_fit(speed, mu, v_s)[1] for mu in coefficients]

@@ -76,16 +76,14 @@ def quasi_static_torques(
     angles: np.ndarray,
     rates: np.ndarray,
     load: np.ndarray | None,
-    z: np.ndarray | None = None,
     start: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Motor torques against friction and a load on the centre of mass ``(2, n_time)``; without tail
-    velocities z at those that balance, sought near `start`."""
+    """Motor torques against friction and a load on the centre of mass ``(2, n_time)``, at tail
+    velocities that balance, sought near `start`."""
     body: Any = solution.problem.body
     law, delta = solution.problem.law, solution.delta_per_period
-    if z is None:
-        balance = body.solve if load is None else partial(solve_balance, body, load=load)
-        z = balance(law, angles, rates, delta, start=start).z
+    balance = body.solve if load is None else partial(solve_balance, body, load=load)
+    z = balance(law, angles, rates, delta, start=start).z
     forces = body.forces(law, angles, rates, z, delta)
     return solution.problem.of_motors(joint_moments(body, angles, forces, load))
 

@@ -221,9 +221,6 @@ def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
         ("repot", "colloc report?"),
         ("x.py", "colloc solve x.py?"),
         ("zzzz", "choose one of init,"),
-        ("referee", "python -m benchmarks.referee"),
-        ("open", "colloc multistart ARCHIVE.h5 --start N"),
-        ("compare", "colloc verify A.h5 --compare B.h5"),
     ):
         assert colloc([word]) == 2
         assert hint in capsys.readouterr().err
