@@ -1,0 +1,249 @@
+"""What colloc prints, writes and draws about results in many states is what it was when it was last
+read: words to the letter, numbers up to rounding.
+
+A file of `texts` is a record: lines that begin with ``$`` are commands of ``colloc``, or of `ALSO`
+below, and what they print follows. They are recorded anew by
+
+    COLLOC_RECORD=1 python -m pytest tests/recorded/test_recorded_texts.py
+
+and what has changed then is to be read before it is committed. Numbers are compared to 2e-4 or a
+unit of the last digit, whole ones exactly; those with exponents, which are errors, within a factor
+of 3, and not at all where both are rounding. What depends on the machine is left out.
+"""
+
+import os
+import re
+from dataclasses import replace
+from itertools import zip_longest
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from colloc import Objective, save
+from colloc.commands.main import main
+from colloc.commands.solve import summary_lines
+from colloc.pictures.report_page import report_page
+from colloc.results.archive import StartName
+from colloc.studies.families import Gap, ParetoFront, Steering
+from tests.recorded.states import LOOP, MADE, STATED, state
+from tests.shared.store_samples import archive, outcome
+
+TEXTS = Path(__file__).with_name("texts")
+NUMBER = re.compile(r"([-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)")
+PRECISION, FACTOR, ROUNDING, OF_MACHINE = 2e-4, 3.0, 1e-6, 1e-12
+MACHINE = {
+    r"in \d+\.\d s\b": "in ... s",
+    r"\d+ (time points|iterations)": r"... \1",
+    r"best of 8 starts; \d+ converged": "best of 8 starts; ... converged",
+    r"\(\d+ kB": "(... kB",
+    r"[0-9a-f]{64}": "...",
+    r"(?m)^(python|colloc|casadi|numpy|scipy|h5py)\n\d\S*$": r"\1 ...",
+    r"colloc \d\S*": "colloc ...",
+    r"\d+\.\d+\n\d+\.\d s in all": "... s in all",
+    r"(?m)^(seconds +|iterations +|intervals +)\d.*": r"\1...",
+}
+"""What no two machines print alike."""
+READ = {
+    "loop.py": "from colloc import *\nPROBLEM = Problem('loop', gait=Harmonic(1), delta=1e-2)\n",
+    "study.py": (
+        "from colloc import *\n"
+        "STUDY = Study('none', (Axis('mu_t', (1, 2)),), lambda mu_t: Problem('no', delta=-mu_t))\n"
+    ),
+}
+NAMES = "time_s,joint_1,joint_2,x,y"
+ALSO = {}
+
+
+def also(function):
+    ALSO[function.__name__] = function
+    return function
+
+
+@also
+def colloc(*words):
+    code = main(words)
+    return f"exit code {code}" * (code != 0)
+
+
+@also
+def summary(name, *verbose):
+    return "\n".join(summary_lines(state(name), None, verbose=bool(verbose)))
+
+
+@also
+def show(file, first=1, last=None):
+    """Lines of a file."""
+    lines = Path(file).read_text(encoding="utf-8").splitlines()
+    return "\n".join(lines[int(first) - 1 : int(last or len(lines))])
+
+
+@also
+def represent(*names):
+    every = (x for name in names for x in (state(name), state(name).problem, state(name).answer))
+    return "\n".join(map(repr, every))
+
+
+@also
+def page(name, lines=None):
+    """Words of the report, or so many lines of them, but for the drawings."""
+    words = words_of(report_page(state(name), gap="  upper bound 1")).splitlines()
+    return "\n".join(words[: int(lines or len(words))])
+
+
+@also
+def card(name):
+    return words_of(state(name)._repr_html_())
+
+
+def words_of(page):
+    page = re.sub(r"(?s)<(style|script|svg).*?</\1>", "", page)
+    return re.sub(r"\s*\n\s*", "\n", re.sub(r"(<[^>]*>\s*)+", "\n", page))
+
+
+@also
+def draw(name, panel=None):
+    solution = state(name)
+    if panel is None:
+        return described(solution.plot())
+    return described(solution.plot(Figure().add_subplot(), panel).figure)
+
+
+def described(figure):
+    """What a figure says and draws; lines of one look but for their colour together."""
+    rows = [f"text: {text.get_text()}" for text in figure.texts]
+    for axes in figure.axes:
+        rows.append(f"axes: {axes.get_title()}")
+        for axis, view in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+            ticks = [tick.get_text() for tick in axis.get_ticklabels()] if axes.axison else []
+            named = f"{axis.get_label_text()}: {' '.join(ticks)}"
+            rows.append(f"  {named}, {axis.get_scale()}, {span(view)}")
+        if legend := axes.get_legend():
+            rows.append(f"  legend: {', '.join(text.get_text() for text in legend.get_texts())}")
+        if axes.texts:
+            rows.append(f"  text: {', '.join(text.get_text() for text in axes.texts)}")
+        looks = {}
+        for line in axes.lines:
+            xy = np.array(line.get_data(), dtype=float)
+            look = f"{line.get_linestyle()} {line.get_marker()} {line.get_linewidth():.3g}"
+            looks.setdefault(look, []).append((to_hex(line.get_color()), xy))
+        for look, lines in looks.items():
+            colours = [*dict.fromkeys(colour for colour, _ in lines)]
+            rows.append(
+                f"  {len(lines)} x {look}, {len(colours)} colours {' '.join(colours[:4])}: "
+            )
+            rows[-1] += course(np.concatenate([xy for _, xy in lines], axis=1))
+        for marks in axes.collections:
+            xy = np.array(marks.get_offsets(), dtype=float).reshape(-1, 2)
+            if len(xy) < 2:
+                xy = np.concatenate([xy[:0], *(path.vertices for path in marks.get_paths())])
+            rows.append(f"  {type(marks).__name__}: {course(xy.T)}")
+    return "\n".join(rows)
+
+
+@also
+def pareto():
+    front = ParetoFront(
+        state("robot").problem, (Objective("distance"), state("robot").problem.objective),
+        (state("robot"), state("small")), (Gap(0, "The best gaits are those beside it.", True),),
+    )  # fmt: skip
+    with patch("colloc.studies.families.pareto_front", return_value=front):
+        colloc("pareto", "loop.py", "--no-figure")
+    return f"{front!r}\n{front.narrow}\n{described(front.plot())}"
+
+
+@also
+def steer():
+    right = state("turning")
+    family = Steering(right.problem, (right.rotation, 0.0), (right, state("loop")), None)
+    spot = replace(family, turns=family.turns[:1], points=family.points[:1])
+    family = replace(family, on_the_spot=spot)
+    with patch("colloc.studies.families.steer", return_value=family):
+        colloc("steer", "loop.py", "--no-figure")
+    return described(family.plot())
+
+
+def span(values):
+    return " to ".join(f"{x:.4g}" for x in values)
+
+
+def course(xy):
+    """Number of points, and first, last, smallest, largest and mean x and y of these."""
+    xy = xy[:, np.isfinite(xy).all(axis=0)]
+    if not xy.size:
+        return "nothing"
+    told = (f"{span(z[[0, -1]])} in {span((z.min(), z.max()))}, mean {z.mean():.4g}" for z in xy)
+    return f"{xy.shape[1]} points, {'; '.join(told)}"
+
+
+def printed(line, capsys):
+    name, *words = line.split()
+    text = ALSO[name](*words) or ""
+    text = "".join(capsys.readouterr()) + text
+    for pattern, instead in MACHINE.items():
+        text = re.sub(pattern, instead, text)
+    return [each.rstrip() for each in text.strip("\n").splitlines()]
+
+
+def same(found, known):
+    """Whether two lines say the same."""
+    one, other = NUMBER.split(found), NUMBER.split(known)
+    if one[::2] != other[::2]:
+        return False
+    is_error = [bool(re.search(r"(\+- ?|± ?)$", word)) for word in other[::2]]
+    return all(map(same_number, one[1::2], other[1::2], is_error))
+
+
+def same_number(found, known, is_error=False):
+    if found == known:
+        return True
+    a, b = (abs(float(text.replace("−", "-"))) for text in (found, known))
+    if is_error or "e-" in found + known:
+        least = OF_MACHINE if is_error else ROUNDING
+        return max(a, b) < least or max(a, b) <= FACTOR * min(a, b)
+    if "." not in found + known:
+        return False
+    apart = abs(float(found.replace("−", "-")) - float(known.replace("−", "-")))
+    return apart <= 1.01 * 10.0 ** -len(known.partition(".")[2].partition("e")[0]) + PRECISION * b
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with what commands read."""
+    made = tmp_path_factory.mktemp("texts")
+    for name, text in READ.items():
+        (made / name).write_text(text, encoding="utf-8")
+    time = np.arange(41) / 10
+    angles = [*LOOP.angles(time / 4), *state("loop").sample(time / 4).centre]
+    np.savetxt(made / "crawls.csv", np.transpose([time, *angles]), "%.6f", ",", header=NAMES)
+    found = archive(made / "starts.h5")
+    failed = replace(outcome(3), status="not converged", message="It did not end.")
+    found.add({StartName("latin-hypercube", 0, 3): failed})
+    return made
+
+
+@pytest.mark.parametrize("name", sorted(file.stem for file in TEXTS.glob("*.txt")))
+def test_texts_are_what_they_were(name, folder, solved, monkeypatch, capsys):
+    if name == "optimum":
+        monkeypatch.setitem(MADE, name, solved("three_link")[0])
+    file, found = TEXTS / f"{name}.txt", []
+    monkeypatch.chdir(folder)
+    recorded = file.read_text(encoding="utf-8").splitlines()
+    for line in (each for each in recorded if each.startswith("$ ")):
+        for word in line.split():
+            stem = word.removesuffix(".h5")
+            if stem in {**MADE, **STATED} and stem != word and not Path(word).exists():
+                save(state(stem), word)
+        found += [line, *printed(line[2:], capsys)]
+    if os.environ.get("COLLOC_RECORD"):
+        file.write_text("\n".join(found) + "\n", encoding="utf-8")
+        return
+    differ = [
+        f"recorded: {known}\nfound:    {now}"
+        for now, known in zip_longest(found, recorded, fillvalue="(nothing)")
+        if not same(now, known)
+    ]
+    assert not differ, "\n".join(differ[:10])
