@@ -33,7 +33,7 @@ from benchmarks.tables import markdown_table
 from colloc import Chain, Friction, Harmonic, Problem, solve
 from colloc.gaits.harmonic import harmonics_within
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait
-from colloc.results.measured import measure
+from colloc.results.checks import measure
 from colloc.results.solution import SOLVED
 from colloc.verification.adaptive_motion import Path as GaitPath
 from scripts.program import add_to_record, command_line, read_record

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.known import known, row_of, save_known, with_row
-from colloc.commands.ending import FAILED, OK, run
-from colloc.commands.main import PRINTING, flag, option, status_line, tell
+from colloc.commands.main import FAILED, OK, PRINTING, flag, option, run, status_line, tell
 from colloc.results.store import load
 from colloc.system.errors import CollocError, ProblemError
 from colloc.system.files import alone_in

@@ -21,7 +21,7 @@ from benchmarks.tables import markdown_table
 from colloc import Chain, Fourier, Friction, NotConvergedError, replay
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
-from colloc.results.measured import measure
+from colloc.results.checks import measure
 from colloc.verification.differential_motion import GaitOnSlope, GaitWithInertia
 from colloc.verification.replay import replayer
 from scripts.program import command_line

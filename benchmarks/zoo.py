@@ -53,9 +53,8 @@ from colloc import (
     Viscous,
     Wheel,
 )
-from colloc.gaits.harmonic import harmonics_within
+from colloc.gaits.harmonic import Serpenoid, harmonics_within
 from colloc.gaits.objective import EFFICIENCY
-from colloc.gaits.serpenoid import Serpenoid
 from colloc.gaits.starts import largest_amplitude
 from colloc.mechanics.law import Law, rate_independent
 from colloc.results.solution import SOLVED

@@ -24,8 +24,8 @@ from colloc.laws.fitted_friction import (
     fitted_friction as fitted_friction,
     FittedFriction as FittedFriction,
 )
-from colloc.gaits.serpenoid import Serpenoid as Serpenoid
-from colloc.gaits.harmonic import Harmonic as Harmonic, Fourier as Fourier, ellipse as ellipse
+from colloc.gaits.harmonic import Harmonic as Harmonic, Serpenoid as Serpenoid
+from colloc.gaits.harmonic import Fourier as Fourier, ellipse as ellipse
 from colloc.gaits.regime import Free as Free
 from colloc.gaits.robot import Robot as Robot
 from colloc.gaits.bspline import BSpline as BSpline, Polygon as Polygon
@@ -37,7 +37,7 @@ from colloc.studies.study import Study as Study, Axis as Axis
 from colloc.studies.families import pareto_front as pareto_front, steer as steer
 from colloc.results.solution import Solution as Solution
 from colloc.results.store import load as load, save as save
-from colloc.pictures.controllers import Servo as Servo
+from colloc.pictures.export import Servo as Servo
 from colloc.search.evaluate import evaluate as evaluate
 from colloc.search.identify import identify as identify
 from colloc.search.certify import certify as certify

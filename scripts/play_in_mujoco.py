@@ -26,7 +26,7 @@ from scipy.integrate import solve_ivp
 
 import colloc
 from colloc import Chain, Problem
-from colloc.commands.ending import OK, run
+from colloc.commands.main import OK, run
 from colloc.mechanics.inertia import checked_mass
 from colloc.mechanics.law import Law
 from colloc.pictures.export import mjcf

@@ -16,9 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colloc.commands import main as cli
-from colloc.commands.ending import FAILED, INTERRUPTED, NONE_FOUND, OK
-from colloc.commands.front import Found, find_family, find_front
-from colloc.commands.solve import bound_facts, save_and_tell
+from colloc.commands.solve import Found, bound_facts, find_family, find_front, save_and_tell
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import objective_from
 from colloc.gaits.problem import Problem
@@ -156,8 +154,8 @@ def multistart(options: argparse.Namespace) -> int:
     cli.tell(options, facts | {"bound": bound_facts(bound), "interrupted": interrupted}, lines)
     if interrupted:
         cli.complain("interrupted; run the same command again to go on.")
-        return INTERRUPTED
-    return OK if optima else NONE_FOUND
+        return cli.INTERRUPTED
+    return cli.OK if optima else cli.NONE_FOUND
 
 
 def _open_archive(options: argparse.Namespace) -> int:
@@ -170,7 +168,7 @@ def _open_archive(options: argparse.Namespace) -> int:
     if options.start is None:
         optima, facts, lines = starts_summary(problem, [*archive.outcomes.values()], archive.path)
         cli.tell(options, facts, lines)
-        return OK if optima else NONE_FOUND
+        return cli.OK if optima else cli.NONE_FOUND
     if start not in archive.outcomes:
         there = sorted({f"{name.sampler} seed {name.seed}" for name in archive.outcomes})
         raise ProblemError(
@@ -241,8 +239,8 @@ def sweep(options: argparse.Namespace) -> int:
     cli.tell(options, *sweep_summary(study, table, path))
     if interrupted:
         cli.complain("interrupted; what is done is kept, and the same command goes on from there.")
-        return INTERRUPTED
-    return OK if (table.variables["status"] == SOLVED).all() else NONE_FOUND
+        return cli.INTERRUPTED
+    return cli.OK if (table.variables["status"] == SOLVED).all() else cli.NONE_FOUND
 
 
 def sweep_summary(study: Study, table: StudyTable, path: Path) -> tuple[dict[str, Any], list[str]]:
@@ -286,7 +284,7 @@ def _begin(options: argparse.Namespace, ending: str) -> tuple[ProblemFile, Path,
 def _end(options: argparse.Namespace, found: Found) -> int:
     family, facts, lines, saved = found
     cli.tell(options, facts, lines, saved)
-    return OK if family.certified else FAILED
+    return cli.OK if family.certified else cli.FAILED
 
 
 @cli.command(

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from colloc.commands import main as cli
-from colloc.commands.ending import FAILED, OK
 from colloc.gaits.problem_file import read_problem_file
 from colloc.results.checks import Certificate
 from colloc.results.comparison import compare, verdict
@@ -136,7 +135,7 @@ def verify(options: argparse.Namespace) -> int:
         **({} if dry is None else {"dry": dry.facts()}),
     }
     cli.tell(options, facts | now.facts(), lines)
-    return OK if good else FAILED
+    return cli.OK if good else cli.FAILED
 
 
 def _compare(options: argparse.Namespace, a: Solution, b: Solution) -> int:
@@ -155,7 +154,7 @@ def _compare(options: argparse.Namespace, a: Solution, b: Solution) -> int:
     widths = [max(len(line[k]) for line in lines) for k in range(2)]
     table = [f"{x:<{widths[0]}}  {y:<{widths[1]}}  {z}".rstrip() for x, y, z in lines]
     cli.tell(options, facts, [*table, sentence])
-    return OK if same else DIFFERENT
+    return cli.OK if same else DIFFERENT
 
 
 def _named(source: Path, other: str | Path | None, kind: str) -> Path:
@@ -207,7 +206,7 @@ def report(options: argparse.Namespace) -> int:
     facts, kilobytes = _write(path)
     lines = [f"saved {path} ({kilobytes}, self-contained)", *(f"  {each}" for each in figures)]
     cli.tell(options, facts | {"figures": figures}, lines)
-    return OK
+    return cli.OK
 
 
 @cli.command(
@@ -238,7 +237,7 @@ def animate(options: argparse.Namespace) -> int:
     write_movie(solution, path, **settings, beside=beside, names=names)
     facts, kilobytes = _write(path)
     cli.tell(options, facts, [f"saved {path} ({kilobytes})"])
-    return OK
+    return cli.OK
 
 
 @cli.command(
@@ -261,7 +260,7 @@ def animate(options: argparse.Namespace) -> int:
 )  # fmt: skip
 def export(options: argparse.Namespace) -> int:
     from colloc.pictures import render
-    from colloc.pictures.controllers import Servo
+    from colloc.pictures.export import Servo
 
     source = Path(options.result)
     solution = load(source)
@@ -279,7 +278,7 @@ def export(options: argparse.Namespace) -> int:
         facts["samples"] = facts["samples_per_period"] * options.periods
     text = render("export.txt", f=facts, solution=solution, periods=options.periods)
     cli.tell(options, facts, text.splitlines())
-    return OK
+    return cli.OK
 
 
 @cli.command(
@@ -301,7 +300,7 @@ def robot(options: argparse.Namespace) -> int:
         facts["figure"] = str(path)
         lines.append(f"saved {path}")
     cli.tell(options, facts | {"notes": sheet.sentences()}, lines)
-    return OK
+    return cli.OK
 
 
 @cli.command(
@@ -315,4 +314,4 @@ def sensitivity(options: argparse.Namespace) -> int:
             line.say(f"{solution.problem.name}: re-optimising")
         slopes = solution.sensitivity(resolve=options.again)
     cli.tell(options, {"file": options.result, **slopes.facts()}, slopes.lines())
-    return OK
+    return cli.OK

@@ -1,36 +1,40 @@
-"""Commands that end in a problem file or in one result, and its summary: init, solve, evaluate."""
+"""Commands that end in a problem file or in one result, and its summary: init, solve, evaluate,
+identify; and families of gaits as commands save them.
+"""
 
 from __future__ import annotations
 
 import argparse
+import csv
+import io
 import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from colloc.commands import main as cli
-from colloc.commands.ending import BAD_PROBLEM, FAILED, NONE_FOUND, OK, naming_saved_files
-from colloc.commands.ending import INTERRUPTED as CODE_INTERRUPTED
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.gaits.problem_file import Reference, read_problem_file
+from colloc.gaits.problem_file import ProblemFile, Reference, read_problem_file
 from colloc.gaits.regime import Free
 from colloc.gaits.robot import Robot
 from colloc.mechanics.chain import Chain
 from colloc.results import limit_use
-from colloc.results.kept import Saved, save_result
 from colloc.results.robot import in_si
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
+from colloc.results.store import Saved, save_result
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
+from colloc.system.files import write_text
 from colloc.system.progress import duration
 
 if TYPE_CHECKING:
     from colloc.bounds.sampled import Bound
     from colloc.gaits.robot_model import Model
+    from colloc.studies.families import ParetoFront
 
 _ROLLING = 0.05  # resistance of a small wheel on a plain bearing, over its load
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
@@ -38,10 +42,10 @@ _LARGEST, _ALIKE = 3.14, 1e-6  # angle of a joint [rad], difference of like dens
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180}
 _MANY_INTERVALS, _SECONDS_PER_INTERVAL = 1000, 0.02
 EXIT = {
-    SOLVED: OK,
-    NOT_CONVERGED: NONE_FOUND,
-    CERTIFICATE_FAILED: FAILED,
-    INTERRUPTED: CODE_INTERRUPTED,
+    SOLVED: cli.OK,
+    NOT_CONVERGED: cli.NONE_FOUND,
+    CERTIFICATE_FAILED: cli.FAILED,
+    INTERRUPTED: cli.INTERRUPTED,
 }
 _SI: dict[str, tuple[dict[str, float], str, str]] = {
     "length": ({"m": 1.0, "cm": 0.01, "mm": 0.001}, "M", "length of the stretched robot [m]"),
@@ -182,7 +186,7 @@ def init(options: argparse.Namespace) -> int:
         facts |= {"joints": model.joints, "notes": notes}
         lines += [f"  {x}" for x in (f"angles in {source}: {model.joints}", *notes)]
     cli.tell(options, facts, lines)
-    return OK
+    return cli.OK
 
 
 def _stated(values: dict[str, Any]) -> str:
@@ -361,7 +365,7 @@ def solve(options: argparse.Namespace) -> int:
         records = save_and_clear(solution, path)
         path = records[0].path
         saved = [str(path), *(f"{one.path} (the gait that shrank)" for one in records[1:])]
-    with naming_saved_files(saved):
+    with cli.naming_saved_files(saved):
         with cli.status_line(options) as line, complaining("no bound"):
             if options.bound:
                 line.say("computing an upper bound on every gait")
@@ -383,7 +387,6 @@ def solve(options: argparse.Namespace) -> int:
         if options.front and not solution.success:
             cli.complain("no front, as the answer is not verified.")
         elif options.front:
-            from colloc.commands.front import find_front
             from colloc.search.options import OPTIONS
 
             with complaining("no front"):
@@ -399,7 +402,7 @@ def solve(options: argparse.Namespace) -> int:
         complaints.append("interrupted; the same command goes on from there.")
     for complaint in complaints:
         cli.complain(complaint)
-    return BAD_PROBLEM if complaints and ended else EXIT[solution.status]
+    return cli.BAD_PROBLEM if complaints and ended else EXIT[solution.status]
 
 
 _OF_A_GAIT = (
@@ -442,4 +445,98 @@ def identify(options: argparse.Namespace) -> int:
         line.say(f"{problem.name}: identifying friction")
         found = identify_friction(problem, options.gait, **cli.values(options, *names))
     cli.tell(options, found.facts(), [f"{problem.name}: {found.message}", str(found)])
-    return OK
+    return cli.OK
+
+
+Found = tuple[Any, dict[str, Any], list[str], list[Saved]]
+"""A family, facts about it, lines for people, and what is saved."""
+
+
+def find_family(
+    options: argparse.Namespace,
+    stated: ProblemFile,
+    table: Path,
+    find: Callable[[Callable[..., None]], Any],
+    describe: Callable[[Any, dict[Path, Solution]], tuple[str, dict[str, Any], list[str]]],
+) -> Found:
+    """Find a family, save its members and its table, and draw it.
+
+    `find` is called with what shows progress. From the family and its members by their paths
+    `describe` gives the text of the table, facts, and lines for people.
+    """
+    from colloc.studies.solve import checkpoints_in
+
+    members, saved, name = dict[Path, Solution](), list[Saved](), stated.problem.name
+    with checkpoints_in(table.with_suffix("")):
+        with cli.status_line(options) as line:
+
+            def say(what: str, point: Solution | None = None) -> None:
+                value = point and f": {point.problem.objective.short} = {point.value:.6g}"
+                line.say(f"{name}: {what}{value or ''}")
+
+            family = find(say)
+        named = {f"{k:02d}": point for k, point in enumerate(family.points)}
+        if spot := getattr(family, "on_the_spot", None):
+            named |= {f"spot_{k:02d}": point for k, point in enumerate(spot.points)}
+        for stem, solution in named.items():
+            solution.source = stated.source
+            saved += (one := save_result(solution, table.with_suffix("") / f"{stem}.h5"))
+            members[one[0].path] = solution
+        content, facts, lines = describe(family, members)
+        write_text(table, content)
+        points, files = f", {next(iter(members))} ...", [table]
+        if not options.no_figure:
+            from colloc.pictures.style import save as save_figure
+
+            with cli.naming_saved_files([f"{table}{points}"]):
+                files += save_figure(family.plot(), table.with_suffix(""), ("png",))
+        last = f"  saved {', '.join(map(str, files))}{points}"
+    return family, facts | {"file": str(table)}, [f"{name}: {lines[0]}", *lines[1:], last], saved
+
+
+def find_front(options: argparse.Namespace, stated: ProblemFile, table: Path, **how: Any) -> Found:
+    """Find, save and draw a front, by arguments of `colloc.pareto_front`."""
+    from colloc.studies.families import pareto_front
+
+    def find(say: Callable[..., None]) -> ParetoFront:
+        def report(k: int, point: Solution) -> None:
+            say(f"gait {k} of the front", point)
+
+        say("the ends of the front")
+        return pareto_front(stated.problem, **how, progress=report)
+
+    return find_family(options, stated, table, find, _front_table)
+
+
+def _front_table(
+    front: ParetoFront, members: dict[Path, Solution]
+) -> tuple[str, dict[str, Any], list[str]]:
+    (names, shown), gaps = front.in_units, {gap.after: gap for gap in front.gaps}
+    aims, rows = [aim.expression for aim in front.objectives], list[dict[str, Any]]()
+    lines = [
+        f"{front.title}, {len(members)} gait{'s' * (len(members) > 1)}",
+        f"      {''.join(f'{name:>16s}' for name in names)}",
+    ]
+    every = zip(members.items(), front.values.tolist(), shown.tolist(), strict=True)
+    for k, ((path, point), values, numbers) in enumerate(every):
+        both = zip((*aims, *names), (*values, *numbers), strict=True)
+        rows.append(
+            {"point": k}
+            | {name: x for name, x in both if name in aims or numbers != values}
+            | {name: getattr(point, name) for name in ("distance", "work", "status")}
+            | {"file": str(path), "gap": gaps[k].why if k in gaps else ""}
+        )
+        lines.append(f"  {k:3d} {''.join(f'{x:16.7g}' for x in numbers)}  {point.status}")
+        if k in gaps:
+            lines.append(f"       no gait found between: {gaps[k].why}")
+    lines += [f"  {front.narrow}"] * bool(front.narrow)
+    content = io.StringIO(newline="")
+    writer = csv.DictWriter(content, rows[0])
+    writer.writeheader()
+    writer.writerows(rows)
+    facts = {
+        "objectives": [aim.fields() for aim in front.objectives],
+        "points": rows,
+        "gaps": [asdict(gap) for gap in front.gaps],
+    }
+    return content.getvalue(), facts, lines

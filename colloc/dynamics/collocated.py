@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
+from colloc.gaits.gait import ANTIPODAL, BILATERAL, NONE
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import Scheme
 

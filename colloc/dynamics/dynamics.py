@@ -23,9 +23,9 @@ import numpy as np
 from colloc.dynamics.chain import balance_on_slope, momenta_at
 from colloc.dynamics.collocated import CollocatedPose, heading, momenta_image, stage_weights
 from colloc.dynamics.states import CollocatedStates, Rates
-from colloc.gaits.period import chord_per_way
+from colloc.gaits.gait import ANTIPODAL, NONE, fraction
+from colloc.gaits.objective import chord_per_way
 from colloc.gaits.regime import LEVEL, Regime, checked_chain
-from colloc.gaits.symmetry import ANTIPODAL, NONE, fraction
 from colloc.mechanics.balance import Moving
 from colloc.mechanics.bodies import BalancedMotion, Body
 from colloc.mechanics.chain import Chain
@@ -113,7 +113,7 @@ class QuasiStatic:
     law: Law
     regime: Regime = LEVEL
     symmetry: str = NONE
-    """Symmetry of the motion (`colloc.gaits.symmetry`)."""
+    """Symmetry of the motion (`colloc.gaits.gait`)."""
     turn: float = 0.0
     """Prescribed rotation over a period [rad]."""
     joint_map: JointMap | None = None

@@ -6,7 +6,7 @@ import numpy as np
 
 from colloc.dynamics.collocated import CollocatedPose, point_weights
 from colloc.dynamics.dynamics import OMEGA, Inertial, QuasiStatic, Shapes
-from colloc.gaits.period import chord_per_way
+from colloc.gaits.objective import chord_per_way
 from colloc.gaits.regime import Regime
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
@@ -42,7 +42,7 @@ def efficiency_at(
     """Efficiency of a gait in the motion in which all cycles are alike, and its states at the
     points of a mesh whose neighbours share no stage, sought near others or those of the slow
     motion. The distance is the chord of the arc, which does not depend on the phase at which a
-    period begins (`colloc.gaits.period`). `NotConvergedError` if no motion is found."""
+    period begins (`colloc.gaits.objective`). `NotConvergedError` if no motion is found."""
     kind = Inertial if froude else QuasiStatic
     angles, rates = gait(mesh.times)
     shapes = Shapes(angles, rates, delta)

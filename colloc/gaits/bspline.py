@@ -13,18 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import DELTA_START, GaitFunction, finite_array
-from colloc.gaits.harmonic import Harmonic, series_of
-from colloc.gaits.linear import LinearClass
-from colloc.gaits.symmetry import (
+from colloc.gaits.gait import (
     ANTIPODAL,
     BILATERAL,
+    DELTA_START,
     NONE,
     SYMMETRIES,
+    GaitFunction,
+    finite_array,
     fraction,
     solved_phases,
     symmetric_samples,
 )
+from colloc.gaits.harmonic import Harmonic, series_of
+from colloc.gaits.linear import LinearClass
 from colloc.numerics.mesh import Mesh
 from colloc.system.arguments import STATED_IF_SET, is_whole, named_arguments
 from colloc.system.errors import ProblemError

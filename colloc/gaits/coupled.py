@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.gait import BILATERAL, NONE
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.linear import LinearClass
-from colloc.gaits.symmetry import BILATERAL, NONE
 from colloc.mechanics.densities import JointMap
 from colloc.system.arguments import is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from colloc.gaits.gait import GaitFunction, finite_array
-from colloc.gaits.symmetry import BILATERAL, NONE, SYMMETRIES, fraction
+from colloc.gaits.gait import BILATERAL, NONE, SYMMETRIES, GaitFunction, finite_array, fraction
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import JointMap
 from colloc.numerics.mesh import Mesh

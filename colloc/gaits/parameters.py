@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any
 
+from colloc.gaits.gait import BILATERAL
 from colloc.gaits.problem import Problem
-from colloc.gaits.symmetry import BILATERAL
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import Foot
 from colloc.mechanics.law import Law

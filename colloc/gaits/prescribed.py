@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import GaitFunction
+from colloc.gaits.gait import ANTIPODAL, NONE, GaitFunction, both_halves
 from colloc.gaits.harmonic import Fourier, series_of
 from colloc.gaits.linear import LinearClass
-from colloc.gaits.symmetry import ANTIPODAL, NONE, both_halves
 from colloc.system.errors import ProblemError
 
 _INTERVALS_A_STAGE = 4

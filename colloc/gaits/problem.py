@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from colloc.gaits import gait_fields
+from colloc.gaits.gait import ANTIPODAL, BILATERAL, NONE, fraction
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each, range_of
@@ -19,7 +20,6 @@ from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.regime import LEVEL, Free, Regime, regime_of
 from colloc.gaits.robot import DERIVED, Robot
 from colloc.gaits.starts import check_guess, default_guess
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, fraction
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain, formulations
 from colloc.mechanics.contact import crossing_depth

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from colloc.gaits.gait import DELTA_START
-from colloc.gaits.symmetry import ANTIPODAL, NONE
+from colloc.gaits.gait import ANTIPODAL, DELTA_START, NONE
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.inertia import GRAVITY, checked_mass

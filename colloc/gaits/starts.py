@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from colloc.gaits.gait import symmetric_samples
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.limits import Limit, under_one_limit
-from colloc.gaits.symmetry import symmetric_samples
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, link_width

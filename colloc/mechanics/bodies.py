@@ -182,7 +182,7 @@ class Body(Protocol):
 
     @property
     def symmetries(self) -> tuple[str, ...]:
-        """Symmetries that its gaits may have (`colloc.gaits.symmetry`)."""
+        """Symmetries that its gaits may have (`colloc.gaits.gait`)."""
         return ("none", "antipodal")
 
     @property

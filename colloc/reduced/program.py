@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.dynamics.control_problem import ControlProblem
+from colloc.gaits.gait import NONE
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import Objective
-from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import Pairs
 from colloc.mechanics.densities import PathLimits
 from colloc.numerics.peaks import SAMPLES, curvature_of_moving, peaks

@@ -9,10 +9,16 @@ import numpy as np
 
 from colloc.dynamics.collocated import CollocatedPose, whole_turns
 from colloc.dynamics.control_problem import control_problem
-from colloc.gaits.gait import delta_per_period, finite_array
+from colloc.gaits.gait import (
+    ANTIPODAL,
+    BILATERAL,
+    NONE,
+    delta_per_period,
+    finite_array,
+    solved_phases,
+)
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE, solved_phases
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import Sliding
 from colloc.mechanics.chain import Chain

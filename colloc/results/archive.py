@@ -23,7 +23,7 @@ from colloc.gaits.gait_fields import AnyGait, fields, gait_from
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import on_speed_floor
-from colloc.results.distinct_optima import are_one, fourier_series
+from colloc.results.comparison import are_one, fourier_series
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, versions
 from colloc.system.errors import StoreError
 from colloc.system.files import lock_file

@@ -12,8 +12,7 @@ from colloc.gaits.problem import Problem
 from colloc.mechanics.chain import BALANCED, Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.results.answer import EVALUATED, Answer
-from colloc.results.checks import BACKLASH, Certificate, Check
-from colloc.results.measured import astray, measure
+from colloc.results.checks import BACKLASH, Certificate, Check, astray, measure
 from colloc.search.options import TOLERANCES
 from colloc.verification.adaptive_motion import Path, Replay
 from colloc.verification.mesh_error import mesh_error

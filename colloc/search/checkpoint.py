@@ -37,8 +37,7 @@ from colloc.search.options import OPTIONS
 from colloc.system.environment import available_threads
 from colloc.system.errors import CollocError, ReadOnlyRunWarning, StoreError
 from colloc.system.interruption import interruptible, time_limit
-from colloc.system.plain_values import Codec
-from colloc.system.row_file import put_rows, read_rows
+from colloc.system.row_file import Codec, put_rows, read_rows
 from colloc.system.task_pool import process_pool, worker_environment
 
 Arguments = ParamSpec("Arguments")

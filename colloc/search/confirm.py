@@ -16,9 +16,9 @@ import numpy as np
 
 from colloc.dynamics.collocated import whole_turns
 from colloc.dynamics.control_problem import ControlProblem, control_problem
+from colloc.gaits.gait import ANTIPODAL
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
-from colloc.gaits.symmetry import ANTIPODAL
 from colloc.mechanics.contact import far_pairs
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.sqp import stationarity

@@ -34,7 +34,7 @@ from colloc.gaits.starts import (
 from colloc.mechanics.chain import Chain
 from colloc.reduced.program import ReducedProgram
 from colloc.results.answer import Alternative
-from colloc.results.distinct_optima import SAME_VALUE, are_one, fourier_series
+from colloc.results.comparison import SAME_VALUE, are_one, fourier_series
 from colloc.search.checkpoint import active_run, checkpoint
 from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
 from colloc.search.optimise import (

@@ -17,12 +17,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc.gaits.gait import delta_per_period
+from colloc.gaits.gait import NONE, delta_per_period
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.linear import enclosed_area
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
-from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import Pairs, far_pairs, link_width, overlapping_pairs
 from colloc.numerics.sqp import Stationarity, minimize, stationarity, stationarity_around
 from colloc.reduced.program import ReducedProgram, SearchSpace

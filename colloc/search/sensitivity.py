@@ -19,10 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import delta_per_period
+from colloc.gaits.gait import NONE, delta_per_period
 from colloc.gaits.parameters import Parameter, parameters
 from colloc.gaits.problem import Problem
-from colloc.gaits.symmetry import NONE
 from colloc.mechanics.contact import far_pairs
 from colloc.numerics.sqp import stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace

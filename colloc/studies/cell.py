@@ -16,7 +16,7 @@ from colloc.gaits.gait_fields import AnyGait, fields, statement_hash
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, start_gait, to_class
 from colloc.results.archive import ERROR, Outcome, outcome_fields, outcome_from
-from colloc.results.distinct_optima import SAME_GAIT, distance, fourier_series, phase_distance
+from colloc.results.comparison import SAME_GAIT, distance, fourier_series, phase_distance
 from colloc.results.solution import SOLVED
 from colloc.search.explore import with_reachable_distance
 from colloc.search.iterate import Iterate, space_near

@@ -13,7 +13,7 @@ from colloc.mechanics.bodies import Body
 from colloc.mechanics.law import Law
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
-from colloc.results.distinct_optima import phase_distance, reversed_in_time, swap_ends
+from colloc.results.comparison import phase_distance, reversed_in_time, swap_ends
 from colloc.smooth.smooth_body import SmoothBody
 
 _SAME, _STANDING = 0.02, 0.05  # relative distance of a symmetric gait to its image; standing |wave|
@@ -64,7 +64,7 @@ def class_name(
 
 def gait_class(gait: Fourier, body: Body, friction: Law) -> dict[str, Any]:
     """Columns of a study about a gait of a body with at least two joints or modes: symmetries
-    (`colloc.gaits.symmetry`), whether it goes back the way it came, `winding`, `wave_direction`,
+    (`colloc.gaits.gait`), whether it goes back the way it came, `winding`, `wave_direction`,
     `forward_share` and `class_name`."""
     amplitude = float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
     close = _SAME * max(amplitude, 1e-12)

@@ -36,8 +36,8 @@ from colloc.results.archive import (
     open_archive,
     save_archive,
 )
-from colloc.results.kept import Saved, save_result
 from colloc.results.solution import SOLVED, Solution
+from colloc.results.store import Saved, save_result
 from colloc.search.certify import is_trivial
 from colloc.search.checkpoint import Progress
 from colloc.search.explore import with_reachable_distance

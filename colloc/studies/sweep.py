@@ -29,7 +29,7 @@ from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.law import rate_independent
 from colloc.mechanics.native_kernel import native_kernel
 from colloc.results.archive import CRASHED, RETRIED, UNITS, counts
-from colloc.results.distinct_optima import fourier_series, series_class
+from colloc.results.comparison import fourier_series, series_class
 from colloc.results.solution import SOLVED, versions
 from colloc.studies.cell import (
     BETTER,

@@ -51,7 +51,7 @@ from colloc.dynamics.chain import torque_function
 from colloc.dynamics.collocated import closing_sign, momenta_image
 from colloc.dynamics.control_problem import ControlProblem
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.period import chord_per_way
+from colloc.gaits.objective import chord_per_way
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.contact import Pairs
 from colloc.mechanics.densities import Instants

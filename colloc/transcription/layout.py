@@ -12,7 +12,7 @@ from colloc.dynamics.chain import torque_function
 from colloc.dynamics.collocated import CollocatedPose, point_weights, stage_weights, sums
 from colloc.dynamics.control_problem import ControlProblem
 from colloc.dynamics.dynamics import OMEGA, PeriodTotals, Shapes
-from colloc.gaits.period import chord_per_way
+from colloc.gaits.objective import chord_per_way
 from colloc.mechanics.bodies import FULL
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Quantity

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from colloc.gaits.objective import EFFICIENCY, Objective
-from colloc.gaits.period import Period, chord_per_way
+from colloc.gaits.objective import EFFICIENCY, Objective, Period, chord_per_way
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.law import Law

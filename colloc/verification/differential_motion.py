@@ -27,8 +27,7 @@ import numpy as np
 
 from colloc.dynamics.chain import MomentaAt, balance_on_slope, joint_torques, momenta_at
 from colloc.dynamics.follow import ONE_SIDED, STEP, Course, integrate_period
-from colloc.gaits.objective import Objective
-from colloc.gaits.period import chord_per_way
+from colloc.gaits.objective import Objective, chord_per_way
 from colloc.gaits.regime import LEVEL, Regime, checked_chain
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain

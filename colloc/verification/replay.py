@@ -21,8 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colloc.dynamics.follow import ONE_SIDED
-from colloc.gaits.objective import EFFICIENCY, Objective
-from colloc.gaits.period import chord_per_way
+from colloc.gaits.objective import EFFICIENCY, Objective, chord_per_way
 from colloc.gaits.regime import LEVEL, Regime
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain

@@ -19,13 +19,12 @@ import pytest
 
 from colloc import Chain, Harmonic, Problem, ProblemError, StoreError, load, save
 from colloc.bounds.optimality_gap import upper_bound
-from colloc.commands import ending
-from colloc.commands.ending import exit_code
+from colloc.commands.main import exit_code
 from colloc.commands.main import main as colloc
 from colloc.commands.solve import summary_lines
 from colloc.gaits import gait_fields
 from colloc.gaits.problem_file import read_problem_file
-from colloc.results.kept import save_result
+from colloc.results.store import save_result
 from colloc.search.checkpoint import Run
 from colloc.system.row_file import CACHE, put_rows
 from tests.shared.cases import slow
@@ -354,7 +353,7 @@ def test_a_pipe_that_is_closed_early_is_one_sentence_and_a_code_of_its_own(resul
 def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_path):
     """An installation without a compiler has no extension module; other sources, so that what is
     installed beside is not taken for it."""
-    library, kernel = Path(ending.__file__).parents[1], shutil.ignore_patterns("_kernel.*")
+    library, kernel = Path(gait_fields.__file__).parents[1], shutil.ignore_patterns("_kernel.*")
     copied = shutil.copytree(library, tmp_path / "colloc", ignore=kernel)
     (copied / "mechanics" / "native" / "parts.h").write_text("/* another */")
     Path(quick).write_text(QUICK.replace("=12", "=6, mesh_tolerance=0.0"), encoding="utf-8")

@@ -12,7 +12,7 @@ import pytest
 
 import colloc
 from colloc import Chain, Foot, Friction, Harmonic, Pad, Problem, Wheel
-from colloc.commands.ending import BAD_PROBLEM, OK
+from colloc.commands.main import BAD_PROBLEM, OK
 from colloc.commands.solve import init as main
 from colloc.gaits.problem_file import read_problem_file
 from tests.shared.cases import slow_but

@@ -9,8 +9,8 @@ from colloc import Chain, Fourier, Friction
 from colloc.dynamics.collocated import CollocatedPose, heading
 from colloc.dynamics.dynamics import OnSlope, Shapes
 from colloc.dynamics.states import CollocatedStates, Rates
+from colloc.gaits.gait import ANTIPODAL, BILATERAL, NONE
 from colloc.gaits.regime import Regime
-from colloc.gaits.symmetry import ANTIPODAL, BILATERAL, NONE
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 

@@ -7,12 +7,12 @@ import pytest
 import colloc
 from colloc import Basis, BSpline, Chain, Fourier, Harmonic, Problem, Serpenoid, ellipse, load, save
 from colloc.gaits.fitted_gait import fitted_gait
+from colloc.gaits.gait import SYMMETRIES
 from colloc.gaits.gait_fields import CLASSES as KINDS
 from colloc.gaits.gait_fields import fields, gait_from, part_from
 from colloc.gaits.harmonic import harmonics_within, shift_phase
 from colloc.gaits.linear import enclosed_area
 from colloc.gaits.starts import initial_member
-from colloc.gaits.symmetry import SYMMETRIES
 from colloc.search.iterate import space_near
 from colloc.search.solve import solve
 

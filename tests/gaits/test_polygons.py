@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 from colloc import BSpline, Chain, Corners, Friction, Harmonic, Polygon, Problem, ellipse
-from colloc.gaits.gait import GaitFunction
+from colloc.gaits.gait import SYMMETRIES, GaitFunction, symmetric_samples
 from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.starts import warm_start
-from colloc.gaits.symmetry import SYMMETRIES, symmetric_samples
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.verification.replay import replay
 

@@ -11,7 +11,7 @@ from colloc import Chain, Fourier, Friction, Harmonic, Problem, Solution, ellips
 from colloc.commands.results import verify as recheck
 from colloc.gaits.objective import QUANTITIES
 from colloc.results.answer import SecondOrder
-from colloc.results.measured import extrapolated_limit
+from colloc.results.checks import extrapolated_limit
 from colloc.search import certify as verify
 from colloc.search.certify import certify, gait_certificate
 from colloc.verification import replay as replay_module

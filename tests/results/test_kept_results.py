@@ -10,8 +10,8 @@ import pytest
 
 from colloc import StoreError, load
 from colloc.commands.main import main as colloc
-from colloc.results import kept
-from colloc.results.kept import save_result
+from colloc.results import store
+from colloc.results.store import save_result
 
 FILE = """
 from colloc import *
@@ -72,7 +72,7 @@ def test_on_a_file_system_without_locks_a_result_is_read_and_replaced(three_link
     save_result(three_link, path)
     code = f"""if True:
         from pathlib import Path
-        from colloc.results.kept import save_result
+        from colloc.results.store import save_result
         from colloc.results.store import load
         path = Path({str(path)!r})
         print(save_result(load(path), path)[0].former)"""
@@ -114,7 +114,7 @@ def test_where_the_new_result_cannot_be_written_all_stays_as_it_was(
     def without_links(*_):
         raise OSError("not supported")
 
-    monkeypatch.setattr(kept.store, "save", full)
+    monkeypatch.setattr(store, "save", full)
     if not linked:
         monkeypatch.setattr(os, "link", without_links)
     with pytest.raises(StoreError, match="No space left"):

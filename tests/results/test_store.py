@@ -8,7 +8,7 @@ import pytest
 
 from colloc import Friction, Harmonic, Problem, StoreError, load, save, solve
 from colloc.gaits.starts import latin_hypercube_gait, on_speed_floor
-from colloc.results.kept import save_result
+from colloc.results.store import save_result
 from colloc.search import checkpoint as run_module
 from colloc.search.checkpoint import ROWS, Run
 from colloc.search.options import OPTIONS, TOLERANCES, SearchOptions, Tolerances

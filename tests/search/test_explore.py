@@ -12,7 +12,7 @@ from colloc import Chain, Foot, Friction, Harmonic, Polygon, Problem, Viscous, W
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.contact import crossing_depth
 from colloc.results.checks import UNCERTIFIED
-from colloc.results.distinct_optima import distance
+from colloc.results.comparison import distance
 from colloc.search import explore
 from colloc.search import solve as stages
 from colloc.search.checkpoint import Run

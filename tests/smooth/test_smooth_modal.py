@@ -9,7 +9,7 @@ from colloc import Fourier, Friction, Harmonic, ModalBody, Problem, Wave, load, 
 from colloc.dynamics.control_problem import control_problem
 from colloc.reduced.linear_space import LinearSpace
 from colloc.reduced.program import ReducedProgram
-from colloc.results.distinct_optima import distance, reversed_in_time, swap_ends
+from colloc.results.comparison import distance, reversed_in_time, swap_ends
 from colloc.search.iterate import evaluate_at, space_near
 from colloc.search.optimise import on_more_panels
 from colloc.search.solve import solve
@@ -118,7 +118,7 @@ def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_progra
 @pytest.mark.parametrize("basis", ["legendre", "fourier"])
 def test_a_gait_seen_from_the_other_end_backwards_in_time_is_the_same_gait(basis):
     """The reversed swap keeps distance and work under every friction
-    (`colloc.results.distinct_optima`), smooth bodies too."""
+    (`colloc.results.comparison`), smooth bodies too."""
     body, friction, t = ModalBody(4, basis), Friction(mu_t=2, mu_f=1, mu_b=3), np.arange(40) / 40
     gait, powers = wave(body, 0.8), []
     image = reversed_in_time(swap_ends(gait, body))

@@ -34,7 +34,7 @@ from colloc.results.archive import (
     save_archive,
 )
 from colloc.results.checks import UNCERTIFIED
-from colloc.results.distinct_optima import images, phase_distance, reversed_in_time
+from colloc.results.comparison import images, phase_distance, reversed_in_time
 from colloc.results.solution import SOLVED
 from colloc.search import certify
 from colloc.search.certify import is_trivial

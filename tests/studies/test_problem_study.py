@@ -25,7 +25,7 @@ from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.linear import Combination
 from colloc.results.archive import CRASHED, PASSED_OVER, Outcome
-from colloc.results.distinct_optima import reversed_in_time, swap_ends
+from colloc.results.comparison import reversed_in_time, swap_ends
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
 from colloc.studies import sweep as study_run
