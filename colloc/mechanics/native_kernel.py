@@ -94,6 +94,8 @@ def library() -> ctypes.CDLL | None:
         if multiprocessing.parent_process() is None:  # workers leave it to their parent
             warnings.warn(_SLOW, SlowWarning, stacklevel=2)
         return None
+    for name in ("colloc_period", "colloc_period_vjp"):  # of as many lanes as the processor has
+        setattr(built, name, built[f"{name}_{built.colloc_lanes()}"])
     return with_signatures(built, _SIGNATURES)
 
 

@@ -13,8 +13,12 @@ from shared.address_sanitizer import stays_within_its_arrays
 from shared.instants import random_instants
 
 from colloc import Chain, Friction, solve_balance
+from colloc.dynamics.compiled_period import CompiledPeriod
+from colloc.dynamics.dynamics import QuasiStatic, Shapes, TotalGradient
 from colloc.mechanics import native_kernel as native_kernel_module
 from colloc.mechanics.native_kernel import library, native_kernel
+from colloc.numerics.mesh import Mesh
+from colloc.numerics.schemes import scheme
 from colloc.system.environment import available_threads
 from colloc.system.errors import SlowWarning
 
@@ -104,6 +108,32 @@ def test_solving_a_balance_loads_neither_casadi_nor_matplotlib():
         "assert not {'casadi', 'matplotlib', 'numba'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@needs_kernel
+@pytest.mark.parametrize("lengths", [(1 / 3,) * 3, (0.3, 0.2, 0.15, 0.35)], ids=len)
+def test_a_period_has_the_same_bits_with_any_number_of_lanes(fresh, lengths):
+    """With time points that no number of lanes divides, and where joints turn by many turns."""
+    body, kernel = Chain(lengths), library()
+    mesh = Mesh(scheme("radau-3"), np.linspace(0.0, 1.0, 8))
+    rng, n = np.random.default_rng(3), body.n_joint
+    angles = rng.uniform(-3, 3, (n, mesh.n_point)) + 2e5 * (np.arange(mesh.n_point) == 5)
+    shapes = Shapes(angles, rng.normal(size=(n, mesh.n_point)), 1e-3)
+    start = solve_balance(body, Friction(), *shapes[:2], 1e-3).z
+    seen = []
+    for lanes in (2, 4, 8)[: {2: 1, 4: 2, 8: 3}[kernel.colloc_lanes()]]:
+        for name in ("colloc_period", "colloc_period_vjp"):
+            function = kernel[f"{name}_{lanes}"]
+            function.argtypes = getattr(kernel, name).argtypes
+            fresh.setattr(kernel, name, function)
+        period = CompiledPeriod.of(QuasiStatic(body, Friction()), mesh)
+        z, out, totals = period.simulate(shapes, start + 1e-3)
+        np.testing.assert_allclose(z, start, rtol=0, atol=1e-10)
+        slopes = period.vjp(shapes, z, out, [TotalGradient(1 + 1j, 1.0, 1.0)])
+        seen.append((z, out, [totals.displacement, totals.work], *slopes))
+    for other in seen:
+        for one, same in zip(seen[0], other, strict=True):
+            np.testing.assert_array_equal(one, same)
 
 
 WITHIN_ITS_ARRAYS = """

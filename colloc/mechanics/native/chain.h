@@ -16,6 +16,7 @@ typedef struct {
     Real load_x, load_y;               /* its share of an outside force on the body */
 } Link;
 
+#include "elementary.h"
 #include "parts.h"
 
 /* Net force and torque, and what a step has to reduce: the potential less the load's power, or half the squared residual
@@ -37,8 +38,7 @@ static inline void find_directions(
         link[i].number = i;
         link[i].length = length[i];
         link[i].mass = mass[i];
-        link[i].cos = cos(phi);
-        link[i].sin = sin(phi);
+        find_direction(phi, &link[i].cos, &link[i].sin);
         link[i].rate = i > 0 ? rate[(i - 1) * stride] / speed : ZERO;
         link[i].load_x = link[i].load_y = ZERO;
     }
@@ -149,22 +149,21 @@ static inline Total evaluate(
     return total;
 }
 
-/* Sum over links of G^T K G, with G = d(vs, vn, w)/dz and K the slopes or the secants of friction. */
+/* Sum over links of G^T K G, with G = d(vs, vn, w)/dz and K the slopes or the secants of friction on each. */
 static inline void pull_back(
-    const int n, const Link *link, const Sliding *k, const Law *law, Real delta, bool newton, Matrix3 total)
+    const int n, const Link *link, const Sliding *k, const Law *law, Real delta, bool newton, Matrix3 *K, Matrix3 total)
 {
     memset(total, 0, sizeof(Matrix3));
     for (int i = 0; i < n; ++i) {
         const Real c = link[i].cos, s = link[i].sin;
         const Real arm_s = link[i].x * s - link[i].y * c, arm_n = link[i].x * c + link[i].y * s;
-        Matrix3 K;
-        find_slopes(&k[i], law, &link[i], delta, !newton, K);
+        find_slopes(&k[i], law, &link[i], delta, !newton, K[i]);
         for (int j = 0; j < 3; ++j) {
             Vector3 column;
             for (int row = 0; row < 3; ++row)
-                column[row] = j == 0   ? K[row][0] * c - K[row][1] * s
-                              : j == 1 ? K[row][0] * s + K[row][1] * c
-                                       : K[row][0] * arm_s + K[row][1] * arm_n + K[row][2];
+                column[row] = j == 0   ? K[i][row][0] * c - K[i][row][1] * s
+                              : j == 1 ? K[i][row][0] * s + K[i][row][1] * c
+                                       : K[i][row][0] * arm_s + K[i][row][1] * arm_n + K[i][row][2];
             total[0][j] += c * column[0] - s * column[1];
             total[1][j] += s * column[0] + c * column[1];
             total[2][j] += arm_s * column[0] + arm_n * column[1] + column[2];

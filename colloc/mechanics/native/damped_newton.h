@@ -27,6 +27,7 @@ typedef struct {
     Law law;
     Link *link;
     Sliding *now, *trial;
+    Matrix3 *K;
     int anchor;
     Vector3 velocity;
     double residual;
@@ -107,7 +108,7 @@ static inline void iterate(const int n, State *s, double delta, double tolerance
         Matrix3 left;
         Vector3 step, trial;
         double alpha = 1.0;
-        pull_back(n, s->link, s->now, law, delta, newton, left);
+        pull_back(n, s->link, s->now, law, delta, newton, s->K, left);
         solve3(left, at.force, 0.0, step);
         double slope = -2.0 * at.merit, slack = 0.0;
         if (law->associated) {

@@ -72,7 +72,7 @@ int colloc_balance(
 {
     Played played = PLAYED;
     const bool ready = new_room(&played);
-    State s = {.law = played.law, .link = played.link, .now = played.k, .trial = played.k + n};
+    State s = {.law = played.law, .link = played.link, .now = played.k, .trial = played.k + n, .K = played.K};
     for (ptrdiff_t t = first; t < last && ready; ++t) {
         Vector3 tail;
         balance_instant(&played, &s, t, load, start, tolerance, budget, method, tail);
@@ -112,9 +112,7 @@ int colloc_motion(
         if (!slopes)
             continue;
         Matrix3 left;
-        pull_back(n, b.link, b.k, &b.law, own_delta, true, left);
-        for (int i = 0; i < n; ++i)
-            find_slopes(&b.k[i], &b.law, &b.link[i], own_delta, false, b.K[i]);
+        pull_back(n, b.link, b.k, &b.law, own_delta, true, b.K, left);
         for (int column = 0; column < columns; ++column) {
             const bool of_load = column >= 2 * n_joint, of_rate = column >= n_joint && !of_load;
             if (of_load)
@@ -170,12 +168,6 @@ int colloc_repeating(
     return done(&played, ready);
 }
 
-#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__linux__)
-#define FOR_EVERY_PROCESSOR __attribute__((target_clones("avx2", "default")))
-#else
-#define FOR_EVERY_PROCESSOR
-#endif
-
 /* An instant that the lanes lost, from where they began: more slowly and surely. */
 static bool rescue(const Played *b, State *s, ptrdiff_t t, const double *start, double tolerance, double tail[3])
 {
@@ -183,109 +175,31 @@ static bool rescue(const Played *b, State *s, ptrdiff_t t, const double *start, 
     return s->residual <= tolerance;
 }
 
-#include "period.h"
+#include "pose.h"
 
-/* Motion through a period, begun from another one: its angles, rates, delta and tail velocities `start` (3, n_time). Velocities in
-   balance `z` (3, n_time), out (OUTPUTS, n_time), and the totals. `lost`: the number of instants without a balance. */
-FOR_EVERY_PROCESSOR
-int colloc_period(
-    CHAIN, MESH, const double *start_angles, const double *start_rates, double start_delta, const double *start, double tolerance,
-    double *z, double *out, double *totals, long long *lost)
-{
-    Played played = PLAYED, other = PLAYED;
-    const Mesh mesh = MESHED;
-    Room room = {0};
-    const bool ready = new_room(&played) && new_lanes(&room, n, &played.law);
-    State state = {.law = played.law, .link = played.link, .now = played.k, .trial = played.k + n};
-    double *turned = malloc(2 * (size_t)(n_interval * s) * sizeof *turned);
-    other.angles = start_angles, other.rates = start_rates, other.delta = start_delta;
-    *lost = 0;
-    for (ptrdiff_t t = first; t < last && ready && turned; t += LANES) {
-        Vector3 velocity;
-        Lanes own_delta;
-        predict_tail(&other, &room, t, start, angles, rates, z);
-        const Lanes speed = lane_instants(&played, &room, t, z, velocity, &own_delta);
-        const Mask at_rest = lane_balance(n, &room, &played.law, own_delta, tolerance, velocity);
-        if (ANY(~at_rest)) {
-            tail_velocity(room.link, room.k, velocity);
-            for (int i = 0; i < LANES && t + i < last; ++i) {
-                double tail[3];
-                if (at_rest[i])
-                    continue;
-                *lost += !rescue(&played, &state, t + i, z, tolerance, tail);
-                for (int j = 0; j < 3; ++j)
-                    velocity[j][i] = tail[j] / speed[i];
-            }
-            find_velocities_from_tail(n, room.link, room.k, velocity);
-            link_velocity(&room.link[n / 2], &room.k[n / 2], velocity);
-            evaluate(n, room.link, room.k, n / 2, velocity, &played.law, own_delta);
-        }
-        Lanes x = ZERO, y = ZERO, power = ZERO;
-        for (int i = 0; i < n; ++i) {
-            const Sliding *k = &room.k[i];
-            link_velocity(&room.link[i], k, velocity);
-            x += played.mass[i] * velocity[0], y += played.mass[i] * velocity[1];
-            power -= k->fs * k->vs + k->fn * k->vn + k->couple * k->w;
-        }
-        tail_velocity(room.link, room.k, velocity);
-        for (int i = 0; i < 3; ++i)
-            lane_store(z + i * n_time, t, n_time, velocity[i] * speed);
-        lane_store(out + TURNING * n_time, t, n_time, velocity[2] * speed);
-        lane_store(out + ALONG * n_time, t, n_time, x * speed);
-        lane_store(out + ACROSS * n_time, t, n_time, y * speed);
-        lane_store(out + POWER * n_time, t, n_time, power * speed);
-    }
-    double way;
-    const double even = even_rate(&mesh, &way);
-    for (ptrdiff_t t = 0; t < n_time; ++t)
-        out[TURNING * n_time + t] -= even;
-    if (ready && turned)
-        find_pose(&mesh, out, turned, totals);
-    free(turned), free(room.memory);
-    return done(&played, ready && turned);
-}
+/* `colloc_period_N` and `colloc_period_vjp_N` of period.h with N instants side by side, as many as the processor's registers hold. */
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__)
+#pragma GCC push_options
+#pragma GCC target("avx512f")
+#define LANES 8
+#include "lanes.h"
+#pragma GCC pop_options
+#undef LANES
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#define LANES 4
+#include "lanes.h"
+#pragma GCC pop_options
+#undef LANES
+#define WIDEST (__builtin_cpu_supports("avx512f") ? 8 : __builtin_cpu_supports("avx2") ? 4 : 2)
+#else
+#define WIDEST 2
+#endif
+#define LANES 2
+#include "lanes.h"
 
-/* Derivatives of `count` numbers along angles and rates (count, n_time, 2 (n - 1)) and along the pace (count, n_time), from those along
-   the totals, `on` (count, TOTALS), at a motion that `colloc_period` states. */
-FOR_EVERY_PROCESSOR
-int colloc_period_vjp(
-    CHAIN, MESH, const double *z, const double *out, int count, const double *on, double *on_shape, double *on_pace)
+/* The N that suits this processor; the numbers are the same with any. */
+int colloc_lanes(void)
 {
-    Played played = PLAYED;
-    const Mesh mesh = MESHED;
-    const int columns = 2 * (n - 1);
-    Room room = {0};
-    double totals[TOTALS];
-    double *turned = malloc((2 * (size_t)(n_interval * s) + (size_t)(count * OUTPUTS * n_time)) * sizeof *turned);
-    const bool ready = new_room(&played) && new_lanes(&room, n, &played.law) && turned;
-    double *weights = turned + 2 * n_interval * s;
-    if (ready) {
-        find_pose(&mesh, out, turned, totals);
-        for (int row = 0; row < count; ++row)
-            find_weights(&mesh, out, turned, on + TOTALS * row, weights + row * OUTPUTS * n_time, on_pace + row * n_time);
-    }
-    for (ptrdiff_t t = first; t < last && ready; t += LANES) {
-        Vector3 velocity;
-        Matrix3 left, inverse;
-        Lanes own_delta, pulled[columns];
-        const Lanes speed = lane_instants(&played, &room, t, z, velocity, &own_delta), paced = lane_load(pace, t, n_time);
-        evaluate(n, room.link, room.k, n / 2, velocity, &played.law, own_delta);
-        pull_back(n, room.link, room.k, &played.law, own_delta, true, left);
-        inverse3(left, inverse);
-        for (int i = 0; i < n; ++i)
-            find_slopes(&room.k[i], &played.law, &room.link[i], own_delta, false, room.K[i]);
-        for (int row = 0; row < count; ++row) {
-            Lanes on_out[OUTPUTS];
-            for (int i = 0; i < OUTPUTS; ++i)
-                on_out[i] = paced * lane_load(weights + (row * OUTPUTS + i) * n_time, t, n_time);
-            pull_to_shape(n, room.link, room.k, room.K, inverse, on_out, pulled);
-            for (int j = 0; j < columns; ++j) {
-                const Lanes value = j < n - 1 ? pulled[j] * speed : pulled[j];
-                for (int i = 0; i < LANES && t + i < n_time; ++i)
-                    on_shape[(row * n_time + t + i) * columns + j] = value[i];
-            }
-        }
-    }
-    free(turned), free(room.memory);
-    return done(&played, ready);
+    return WIDEST;
 }

@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -47,3 +48,19 @@ typedef double Real;
 #define ZERO 0.0
 #define SELECT(condition, yes, no) ((condition) ? (yes) : (no))
 #define ANY(condition) (condition)
+
+typedef unsigned long long Bits; /* of a number, and the number of bits */
+static inline Bits bits_of(double a)
+{
+    Bits bits;
+    memcpy(&bits, &a, sizeof bits);
+    return bits;
+}
+static inline double number_of(Bits bits)
+{
+    double a;
+    memcpy(&a, &bits, sizeof a);
+    return a;
+}
+#define BITS(a) bits_of(a)
+#define NUMBER(bits) number_of(bits)

@@ -56,11 +56,11 @@ static inline void find_roots_of_part(PartSliding *k, const Part *p, Real delta)
     const Real S = r0 + r1, r0r1 = r0 * r1, T = a2 + y0 * y1;
     k->a2 = a2, k->r0r1 = r0r1, k->S = S;
     /* a^2 / P; P = T + r0 r1 cancels where T < 0 */
-    k->Q = SELECT(T < 0, (r0r1 - T) / (4.0 * half * half), a2 / (r0r1 + T));
+    k->Q = SELECT(T < 0, r0r1 - T, a2) / SELECT(T < 0, 4.0 * half * half, r0r1 + T);
     const Real root_q = 2.0 * fabs(half) / S, q = root_q * root_q, one = 1.0 + root_q;
     k->h = h_series(q);
     if (ANY(q >= 0.1))
-        k->h = SELECT(q >= 0.1, (0.5 * log(one * one * k->Q * S * S / (2.0 * a2)) / root_q - 1.0) / q, k->h);
+        k->h = SELECT(q >= 0.1, (0.5 * logarithm(one * one * k->Q * S * S / (2.0 * a2)) / root_q - 1.0) / q, k->h);
     k->g = 1.0 + q * k->h;
 }
 
@@ -124,7 +124,7 @@ typedef struct {
 } Sliding;
 
 /* Of a chain of n links, so many times over; or NULL. */
-static Sliding *new_slidings(const int n, const int copies, const Law *law)
+static inline Sliding *new_slidings(const int n, const int copies, const Law *law)
 {
     const size_t links = (size_t)(copies * n), parts = (size_t)(copies * law->n_part);
     Sliding *k = malloc(links * sizeof *k + parts * sizeof *k->part);

@@ -1,30 +1,10 @@
 /* A period of a gait in one call: balance at the points of a collocation scheme, several side by side, then orientation, place and
-   work; and the adjoint, by which a gradient costs about what a value does, for chains of any number of links: colloc/reduced/motion.py
-   and colloc/dynamics/collocated.py. Level ground. */
-
-#pragma once
-
-#include "lanes.h"
+   work; and the adjoint, by which a gradient costs about what a value does, for chains of any number of links. Once for every
+   number of lanes, from `lanes.h`. */
 
 #define LANE_ITERATIONS 40
 /* Largest residual times delta that is rounding. */
 #define LANE_ROUNDING 1e-16
-
-enum { TURNING, ALONG, ACROSS, POWER, OUTPUTS }; /* rotation rate less that of the axes, velocity of the centre, power */
-enum { SIDE_X, SIDE_Y, ROTATION, WORK, TOTALS };
-
-/* Points ``(n_interval, s)`` of the scheme (A, b) on intervals of lengths h, and the rotation over all of them of axes that turn
-   evenly, from which motion is seen. */
-typedef struct {
-    ptrdiff_t n_interval, n_time;
-    int s;
-    const double *A, *b, *h, *pace;
-    const long long *points;
-    double turn;
-} Mesh;
-
-#define MESH ptrdiff_t n_interval, int s, const double *A, const double *b, const double *h, const long long *points, double turn, const double *pace
-#define MESHED {.n_interval = n_interval, .n_time = n_time, .s = s, .A = A, .b = b, .h = h, .points = points, .turn = turn, .pace = pace}
 
 /* Inverse by cofactors, after symmetric scaling to a unit diagonal; 0 where that is singular. */
 static inline void inverse3(Matrix3 A, Matrix3 B)
@@ -92,9 +72,9 @@ static inline Mask lane_balance(
         const Mask steep = going & (due > 0);
         Matrix3 left, inverse;
         Vector3 step, there;
-        pull_back(n, link, room->k, law, delta, true, left);
+        pull_back(n, link, room->k, law, delta, true, room->K, left);
         if (ANY(steep)) {
-            pull_back(n, link, room->k, law, delta, false, inverse);
+            pull_back(n, link, room->k, law, delta, false, room->K, inverse);
             for (int i = 0; i < 9; ++i)
                 left[i / 3][i % 3] = SELECT(steep, inverse[i / 3][i % 3], left[i / 3][i % 3]);
         }
@@ -162,8 +142,9 @@ static inline void predict_tail(const Played *b, Room *room, ptrdiff_t t, const 
     const Lanes speed = lane_instants(b, room, t, tail, z, &delta);
     const Link *link = room->link;
     const Sliding *k = room->k;
+    Matrix3 *K = room->K;
     evaluate(n, link, room->k, reference, z, &b->law, delta);
-    pull_back(n, link, k, &b->law, delta, true, left);
+    pull_back(n, link, k, &b->law, delta, true, room->K, left);
     inverse3(left, inverse);
     phi[0] = w[0] = ZERO;
     for (int i = 1; i < n; ++i) {
@@ -188,10 +169,8 @@ static inline void predict_tail(const Played *b, Room *room, ptrdiff_t t, const 
         const Lanes c = link[i].cos, s = link[i].sin, fx = k[i].fs * c - k[i].fn * s, fy = k[i].fs * s + k[i].fn * c;
         const Vector3 d = {vx[i] * c + vy[i] * s + k[i].vn * phi[i], vy[i] * c - vx[i] * s - k[i].vs * phi[i], w[i]};
         Vector3 df;
-        Matrix3 K;
-        find_slopes(&k[i], &b->law, &link[i], delta, false, K);
         for (int row = 0; row < 3; ++row)
-            df[row] = -(K[row][0] * d[0] + K[row][1] * d[1] + K[row][2] * d[2]);
+            df[row] = -(K[i][row][0] * d[0] + K[i][row][1] * d[1] + K[i][row][2] * d[2]);
         const Lanes dfx = df[0] * c - df[1] * s - phi[i] * fy, dfy = df[0] * s + df[1] * c + phi[i] * fx;
         net[0] += dfx, net[1] += dfy;
         net[2] += x[i] * fy - y[i] * fx + link[i].x * dfy - link[i].y * dfx + df[2];
@@ -202,81 +181,6 @@ static inline void predict_tail(const Played *b, Room *room, ptrdiff_t t, const 
     const Vector3 change = {vx[0] + dz[0] - link[0].y * dz[2], vy[0] + dz[1] + link[0].x * dz[2] - 0.5 * link[0].length * rate, rate};
     for (int i = 0; i < 3; ++i)
         lane_store(to + i * b->n_time, t, b->n_time, lane_load(tail + i * b->n_time, t, b->n_time) + change[i] * speed);
-}
-
-/* Length of the path, and the rate at which axes turn evenly, over the pace. */
-static double even_rate(const Mesh *m, double *length)
-{
-    *length = 0.0;
-    for (ptrdiff_t i = 0; i < m->n_interval * m->s; ++i)
-        *length += m->h[i / m->s] * m->b[i % m->s] * m->pace[m->points[i]];
-    return m->turn / *length;
-}
-
-/* Orientations at the points, as their cosines and sines ``(2, n_interval, s)``, and the totals. */
-static void find_pose(const Mesh *m, const double *out, double *turned, double totals[TOTALS])
-{
-    const ptrdiff_t n_stage = m->n_interval * m->s;
-    double theta = 0.0;
-    memset(totals, 0, TOTALS * sizeof *totals);
-    for (ptrdiff_t q = 0; q < m->n_interval; ++q) {
-        const long long *point = m->points + q * m->s;
-        double gained = 0.0;
-        for (int i = 0; i < m->s; ++i) {
-            const ptrdiff_t t = point[i];
-            const double weight = m->h[q] * m->b[i] * m->pace[t];
-            double angle = theta;
-            for (int j = 0; j < m->s; ++j)
-                angle += m->h[q] * m->A[i * m->s + j] * out[TURNING * m->n_time + point[j]] * m->pace[point[j]];
-            const double c = (cos)(angle), s = (sin)(angle);
-            turned[q * m->s + i] = c, turned[n_stage + q * m->s + i] = s;
-            totals[SIDE_X] += weight * (c * out[ALONG * m->n_time + t] - s * out[ACROSS * m->n_time + t]);
-            totals[SIDE_Y] += weight * (s * out[ALONG * m->n_time + t] + c * out[ACROSS * m->n_time + t]);
-            totals[WORK] += weight * out[POWER * m->n_time + t];
-            gained += weight * out[TURNING * m->n_time + t];
-        }
-        theta += gained;
-    }
-    totals[ROTATION] = theta;
-}
-
-/* Derivatives of a number along out times the pace at the points, (OUTPUTS, n_time), and along the pace (n_time), from those along
-   the totals. */
-static void find_weights(const Mesh *m, const double *out, const double *turned, const double on[TOTALS], double *weights, double *on_pace)
-{
-    const ptrdiff_t n_stage = m->n_interval * m->s, n_time = m->n_time;
-    double later = on[ROTATION], along = 0.0, length;
-    const double even = even_rate(m, &length);
-    memset(weights, 0, (size_t)(OUTPUTS * n_time) * sizeof *weights);
-    for (ptrdiff_t q = m->n_interval - 1; q >= 0; --q) {
-        const long long *point = m->points + q * m->s;
-        double on_theta[m->s], sum = 0.0;
-        for (int i = 0; i < m->s; ++i) {
-            const ptrdiff_t t = point[i];
-            const double weight = m->h[q] * m->b[i], c = turned[q * m->s + i], s = turned[n_stage + q * m->s + i];
-            const double vx = c * out[ALONG * n_time + t] - s * out[ACROSS * n_time + t];
-            const double vy = s * out[ALONG * n_time + t] + c * out[ACROSS * n_time + t];
-            on_theta[i] = weight * m->pace[t] * (on[SIDE_Y] * vx - on[SIDE_X] * vy), sum += on_theta[i];
-            weights[ALONG * n_time + t] += weight * (on[SIDE_X] * c + on[SIDE_Y] * s);
-            weights[ACROSS * n_time + t] += weight * (on[SIDE_Y] * c - on[SIDE_X] * s);
-            weights[POWER * n_time + t] += weight * on[WORK];
-        }
-        for (int j = 0; j < m->s; ++j) {
-            double at = m->b[j] * later;
-            for (int i = 0; i < m->s; ++i)
-                at += on_theta[i] * m->A[i * m->s + j];
-            weights[TURNING * n_time + point[j]] += m->h[q] * at;
-        }
-        later += sum;
-    }
-    for (ptrdiff_t t = 0; t < n_time; ++t) {
-        along += weights[TURNING * n_time + t] * m->pace[t];
-        on_pace[t] = 0.0;
-        for (int row = 0; row < OUTPUTS; ++row)
-            on_pace[t] += weights[row * n_time + t] * out[row * n_time + t];
-    }
-    for (ptrdiff_t i = 0; i < n_stage; ++i) /* a longer path turns the axes less on each of its parts */
-        on_pace[m->points[i]] += along * even / length * m->h[i / m->s] * m->b[i % m->s];
 }
 
 /* Derivatives of a number along angles and rates, (2 (n - 1)), from those along out, by the adjoint of the balance and of the
@@ -328,4 +232,105 @@ static inline void pull_to_shape(
         phi += on_phi[j + 1], rate += on_rate[j + 1];
         on_shape[j] = phi, on_shape[n - 1 + j] = rate;
     }
+}
+
+/* Motion through a period, begun from another one: its angles, rates, delta and tail velocities `start` (3, n_time). Velocities in
+   balance `z` (3, n_time), out (OUTPUTS, n_time), and the totals. `lost`: the number of instants without a balance. */
+int colloc_period(
+    CHAIN, MESH, const double *start_angles, const double *start_rates, double start_delta, const double *start, double tolerance,
+    double *z, double *out, double *totals, long long *lost)
+{
+    Played played = PLAYED, other = PLAYED;
+    const Mesh mesh = MESHED;
+    Room room = {0};
+    const bool ready = new_room(&played) && new_lanes(&room, n, &played.law);
+    State state = {.law = played.law, .link = played.link, .now = played.k, .trial = played.k + n, .K = played.K};
+    double *turned = malloc(2 * (size_t)(n_interval * s) * sizeof *turned);
+    other.angles = start_angles, other.rates = start_rates, other.delta = start_delta;
+    *lost = 0;
+    for (ptrdiff_t t = first; t < last && ready && turned; t += LANES) {
+        Vector3 velocity;
+        Lanes own_delta;
+        predict_tail(&other, &room, t, start, angles, rates, z);
+        const Lanes speed = lane_instants(&played, &room, t, z, velocity, &own_delta);
+        const Mask at_rest = lane_balance(n, &room, &played.law, own_delta, tolerance, velocity);
+        if (ANY(~at_rest)) {
+            tail_velocity(room.link, room.k, velocity);
+            for (int i = 0; i < LANES && t + i < last; ++i) {
+                double tail[3];
+                if (at_rest[i])
+                    continue;
+                *lost += !rescue(&played, &state, t + i, z, tolerance, tail);
+                for (int j = 0; j < 3; ++j)
+                    velocity[j][i] = tail[j] / speed[i];
+            }
+            find_velocities_from_tail(n, room.link, room.k, velocity);
+            link_velocity(&room.link[n / 2], &room.k[n / 2], velocity);
+            evaluate(n, room.link, room.k, n / 2, velocity, &played.law, own_delta);
+        }
+        Lanes x = ZERO, y = ZERO, power = ZERO;
+        for (int i = 0; i < n; ++i) {
+            const Sliding *k = &room.k[i];
+            link_velocity(&room.link[i], k, velocity);
+            x += played.mass[i] * velocity[0], y += played.mass[i] * velocity[1];
+            power -= k->fs * k->vs + k->fn * k->vn + k->couple * k->w;
+        }
+        tail_velocity(room.link, room.k, velocity);
+        for (int i = 0; i < 3; ++i)
+            lane_store(z + i * n_time, t, n_time, velocity[i] * speed);
+        lane_store(out + TURNING * n_time, t, n_time, velocity[2] * speed);
+        lane_store(out + ALONG * n_time, t, n_time, x * speed);
+        lane_store(out + ACROSS * n_time, t, n_time, y * speed);
+        lane_store(out + POWER * n_time, t, n_time, power * speed);
+    }
+    double way;
+    const double even = even_rate(&mesh, &way);
+    for (ptrdiff_t t = 0; t < n_time; ++t)
+        out[TURNING * n_time + t] -= even;
+    if (ready && turned)
+        find_pose(&mesh, out, turned, totals);
+    free(turned), free(room.memory);
+    return done(&played, ready && turned);
+}
+
+/* Derivatives of `count` numbers along angles and rates (count, n_time, 2 (n - 1)) and along the pace (count, n_time), from those along
+   the totals, `on` (count, TOTALS), at a motion that `colloc_period` states. */
+int colloc_period_vjp(
+    CHAIN, MESH, const double *z, const double *out, int count, const double *on, double *on_shape, double *on_pace)
+{
+    Played played = PLAYED;
+    const Mesh mesh = MESHED;
+    const int columns = 2 * (n - 1);
+    Room room = {0};
+    double totals[TOTALS];
+    double *turned = malloc((2 * (size_t)(n_interval * s) + (size_t)(count * OUTPUTS * n_time)) * sizeof *turned);
+    const bool ready = new_room(&played) && new_lanes(&room, n, &played.law) && turned;
+    double *weights = turned + 2 * n_interval * s;
+    if (ready) {
+        find_pose(&mesh, out, turned, totals);
+        for (int row = 0; row < count; ++row)
+            find_weights(&mesh, out, turned, on + TOTALS * row, weights + row * OUTPUTS * n_time, on_pace + row * n_time);
+    }
+    for (ptrdiff_t t = first; t < last && ready; t += LANES) {
+        Vector3 velocity;
+        Matrix3 left, inverse;
+        Lanes own_delta, pulled[columns];
+        const Lanes speed = lane_instants(&played, &room, t, z, velocity, &own_delta), paced = lane_load(pace, t, n_time);
+        evaluate(n, room.link, room.k, n / 2, velocity, &played.law, own_delta);
+        pull_back(n, room.link, room.k, &played.law, own_delta, true, room.K, left);
+        inverse3(left, inverse);
+        for (int row = 0; row < count; ++row) {
+            Lanes on_out[OUTPUTS];
+            for (int i = 0; i < OUTPUTS; ++i)
+                on_out[i] = paced * lane_load(weights + (row * OUTPUTS + i) * n_time, t, n_time);
+            pull_to_shape(n, room.link, room.k, room.K, inverse, on_out, pulled);
+            for (int j = 0; j < columns; ++j) {
+                const Lanes value = j < n - 1 ? pulled[j] * speed : pulled[j];
+                for (int i = 0; i < LANES && t + i < n_time; ++i)
+                    on_shape[(row * n_time + t + i) * columns + j] = value[i];
+            }
+        }
+    }
+    free(turned), free(room.memory);
+    return done(&played, ready);
 }

@@ -21,9 +21,10 @@ int colloc_loaded(
     Link *link = malloc((size_t)n * sizeof *link);
     const Law law = law_of(law_numbers);
     Sliding *sliding = new_slidings(n, 2, &law);
+    Matrix3 *slopes = malloc((size_t)n * sizeof *slopes);
     const int middle = n / 2;
-    if (link && sliding) {
-        State s = {.law = law, .link = link, .now = sliding, .trial = sliding + n, .anchor = middle};
+    if (link && sliding && slopes) {
+        State s = {.law = law, .link = link, .now = sliding, .trial = sliding + n, .K = slopes, .anchor = middle};
         for (ptrdiff_t t = first; t < last; ++t) {
             Vector3 own = {load[t], load[n_time + t], load[2 * n_time + t]};
             find_directions(n, link, length, mass, angles + t, rates + t, 1.0, n_time);
@@ -56,5 +57,6 @@ int colloc_loaded(
     }
     free(link);
     free(sliding);
-    return link && sliding ? 0 : 1;
+    free(slopes);
+    return link && sliding && slopes ? 0 : 1;
 }

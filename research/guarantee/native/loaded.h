@@ -33,7 +33,7 @@ static inline Total loaded_newton(const int n, State *s, const Vector3 load, dou
         Matrix3 left;
         Vector3 step, trial;
         double alpha = 1.0;
-        pull_back(n, s->link, s->now, &s->law, delta, true, left);
+        pull_back(n, s->link, s->now, &s->law, delta, true, s->K, left);
         solve3(left, at.force, REGULAR, step);
         const double slope = at.force[0] * step[0] + at.force[1] * step[1] + at.force[2] * step[2];
         bool failed = true;
