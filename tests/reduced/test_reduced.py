@@ -24,7 +24,7 @@ columns of all joints: gait=Basis(ELLIPSES), friction=ROUGH
 polygon: gait=Polygon(4), friction=Friction(mu_t=3, mu_f=1, mu_b=2)
 bilateral polygon: gait=Polygon(5, "bilateral")
 polygon that ends its intervals with nodes: gait=Polygon(4), scheme="radau-3"
-antipodal polygon of three joints: gait=BSpline(6, 1, "antipodal"), **WAVE
+antipodal polygon of three joints: gait=Polygon(6, "antipodal"), **WAVE
 polygon with an axis through sides: gait=Polygon(4, "bilateral", "side"), **FOUR
 serpenoid: gait=Serpenoid(2), **FIVE
 bilateral serpenoid: gait=Serpenoid(2, "bilateral"), **FIVE
