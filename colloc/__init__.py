@@ -37,7 +37,7 @@ _NAMES = {
     "gaits.coupled": "Coupled",
     "mechanics.floor_contact": "Foot Pad Wheel",
     "mechanics.densities": "PathLimit Quantity",
-    "smooth.modal_body": "ModalBody",
+    "smooth.smooth_body": "ModalBody",
     "smooth.crawler_body": "CrawlerBody",
     "smooth.prescribed_body": "Concertina Wave",
     "mechanics.friction": "Friction Axle",

@@ -10,7 +10,7 @@ from colloc.gaits.coupled import Coupled as Coupled
 from colloc.mechanics.floor_contact import Foot as Foot, Pad as Pad, Wheel as Wheel
 from colloc.mechanics.densities import PathLimit as PathLimit
 from colloc.mechanics.densities import Quantity as Quantity
-from colloc.smooth.modal_body import ModalBody as ModalBody
+from colloc.smooth.smooth_body import ModalBody as ModalBody
 from colloc.smooth.prescribed_body import Concertina as Concertina
 from colloc.smooth.crawler_body import CrawlerBody as CrawlerBody
 from colloc.smooth.prescribed_body import Wave as Wave

@@ -72,28 +72,27 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
     if answer.program != EVALUATED:
         residual = float(np.abs(answer.motion.at_points.force).max() / problem.law.largest)
         gradient, second = max(answer.kkt_error, answer.complementarity), answer.second_order
-        before = [
-            ("KKT error", gradient, at.kkt, "gradient of the Lagrangian, complementarity"),
-            (
-                *("constraint violation", answer.violation, at.violation),
-                "largest violated equation or bound",
-            ),
-            ("balance at nodes", residual, at.kkt, "net force and torque by the closed-form law"),
-        ]
         value = max(-second.smallest - second.error, 0.0)
         curvature = f"smallest curvature {second.smallest:.1e}"
-        directions = f"over {second.n_free} free direction{'s' * (second.n_free != 1)}"
+        directions = f"over {second.n_free} free direction{'s' * (second.n_free != 1)} [1/rad^2]"
         if second.why_not:
             value, verdict = 0.0, second.why_not
         elif second.n_free == 0:
             verdict = "a vertex: active constraints leave no free direction [1/rad^2]"
         elif second.smallest > second.error:
-            verdict = f"an optimum: {curvature} {directions} [1/rad^2]"
+            verdict = f"an optimum: {curvature} {directions}"
         elif value > at.saddle:
-            verdict = f"a saddle: {curvature} {directions} [1/rad^2]"
+            verdict = f"a saddle: {curvature} {directions}"
         else:
-            verdict = f"flat: {curvature} +- {second.error:.0e} {directions} [1/rad^2]"
-        before.append(("second order", value, at.saddle, verdict))
+            verdict = f"flat: {curvature} +- {second.error:.0e} {directions}"
+        violation = answer.violation, at.violation, "largest violated equation or bound"
+        by_law = "net force and torque by the closed-form law"
+        before = [
+            ("KKT error", gradient, at.kkt, "gradient of the Lagrangian, complementarity"),
+            ("constraint violation", *violation),
+            ("balance at nodes", residual, at.kkt, by_law),
+            ("second order", value, at.saddle, verdict),
+        ]
     if problem.mesh_tolerance > 0:
         control, allowed = control_problem(problem), problem.mesh_tolerance
         error = mesh_error(control, answer.mesh, gait, speed, allowed).estimate

@@ -1,10 +1,9 @@
 """Results of stages, stored as they appear and read again by the next run of the same problem; and
 stages computed ahead in other processes.
 
-A stage is a function of values. So its result is stored under a digest of its name and arguments,
-and a run that was interrupted goes on by calling every stage once more: what is stored takes no
-time, and the end is the same to the last bit. Results of other processes become known to the run in
-the same way, so the answer does not depend on how many there are.
+A stage is a function of values, so its result is stored under a digest of its name and arguments. A
+run that was interrupted calls every stage once more and ends the same to the last bit; results of
+other processes become known in the same way.
 """
 
 from __future__ import annotations
@@ -49,8 +48,8 @@ _PROBLEM = "problem"
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """Progress of a solve: `done` of `count` starts, gaits followed to the final delta, levels of
-    delta, or meshes; fewer may be enough."""
+    """Progress of a solve: `done` of `count` starts, gaits, levels of delta, or meshes; fewer
+    may be enough."""
 
     stage: str  # of `STAGES`
     done: int
@@ -107,7 +106,6 @@ class Run:
             )
 
     def update(self, rows: dict[str, Any]) -> None:
-        """Add results of another run of the same problem."""
         self.rows.update(rows)
         self._pending.update(rows)
 

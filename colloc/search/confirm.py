@@ -26,13 +26,7 @@ from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
 from colloc.results.answer import NOT_MEASURED, PRESCRIBED, REDUCED, Answer, SecondOrder, Step
 from colloc.search.checkpoint import active_run, checkpoint
-from colloc.search.ipopt import (
-    NlpResult,
-    Solver,
-    explanation,
-    redundant_equations,
-    solve_in_regions,
-)
+from colloc.search.ipopt import NlpResult, Solver, explanation, solve_in_regions
 from colloc.search.iterate import NOT_STATIONARY, STATIONARY, Iterate, space_near, space_of
 from colloc.search.optimise import delta_levels, with_kink
 from colloc.search.options import COARSE, MEDIUM, OPTIONS, TOLERANCES, max_rounds
@@ -171,31 +165,24 @@ def _answer(
     effort: Step | NlpResult,
     **fields: Any,
 ) -> Answer:
-    distance, work = distance_and_work(control, layout_of(control, mesh), x)
-    names = ("kkt_error", "violation", "complementarity", "optimal")
-    fields |= {name: getattr(conditions, name) for name in names}
-    fields |= {name: getattr(effort, name) for name in ("status", "iterations", "seconds")}
+    fields["distance"], fields["work"] = distance_and_work(control, layout_of(control, mesh), x)
+    for name in ("kkt_error", "violation", "complementarity", "optimal"):
+        fields[name] = getattr(conditions, name)
+    for name in ("status", "iterations", "seconds"):
+        fields[name] = getattr(effort, name)
     edges = control.in_phases(mesh, gait).edges
-    return Answer(
-        *(control.problem, gait),
-        edges=edges,
-        scheme=mesh.scheme.name,
-        x=x,
-        distance=distance,
-        work=work,
-        **fields,
-    )
+    return Answer(control.problem, gait, edges=edges, scheme=mesh.scheme.name, x=x, **fields)
 
 
 def answer_of(program: FullProgram, result: NlpResult, delta: float) -> Answer:
-    control, n = program.control, program.layout.n
+    control, n, gait = program.control, program.layout.n, program.member(result.x)
+    multipliers: Any = {"lam_x": result.lam_x[:n], "lam_g": result.lam_g}
     answer = _answer(
-        *(control, program.mesh, program.member(result.x), result.x[:n], result, result),
+        *(control, program.mesh, gait, result.x[:n], result, result),
         delta=delta,
-        lam_x=result.lam_x[:n],
-        lam_g=result.lam_g,
         value=control.unscale(-result.objective),
         program=control.formulation,
+        **multipliers,
     )
     return replace(answer, history=(answer.step,))
 
@@ -275,12 +262,4 @@ def _solve_from(
     # from a guess IPOPT may need five hundred iterations
     last, result = solve_in_regions(program, x, delta, OPTIONS.radius, {"max_iter": 1500})
     answer = answer_of(last, result, delta)
-    if result.optimal:
-        return answer
-    text = explanation(last, result, delta)
-    if redundant := redundant_equations(Solver(program), x, delta):
-        text += (
-            f" Before the first solve the equations were rank deficient, which no optimiser "
-            f"bears: {', '.join(redundant)}."
-        )
-    return replace(answer, message=text)
+    return answer if result.optimal else replace(answer, message=explanation(last, result, delta))

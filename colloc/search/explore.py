@@ -4,7 +4,7 @@ A start is optimised on a coarse mesh down to a delta at which friction is nearl
 meets a gait that an earlier start met at the same delta, it is dropped: it would go on as that one
 did. Every sixteen starts take turns with as many hops from the best gait so far (basin hopping:
 Wales and Doye, J. Phys. Chem. A 101, 1997). Beside them are a few small loops
-(`colloc.search.small_starts`), slow and so optimised at a smaller delta only.
+(`small_loops`), slow and so optimised at a smaller delta only.
 """
 
 from __future__ import annotations
@@ -20,11 +20,22 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colloc.bounds.motions import (
+    CoulombMotion,
+    SmallGait,
+    best_mixture,
+    heading_of,
+    one_joint,
+    unit_directions,
+)
+from colloc.gaits.bspline import Corners
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.harmonic import ellipse
+from colloc.gaits.harmonic import Fourier, ellipse
+from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import (
     is_visible,
+    largest_factor,
     latin_hypercube_gait,
     on_speed_floor,
     to_body,
@@ -32,6 +43,7 @@ from colloc.gaits.starts import (
     travelling_wave,
 )
 from colloc.mechanics.chain import Chain
+from colloc.mechanics.law import rate_independent
 from colloc.reduced.program import ReducedProgram
 from colloc.results.answer import Alternative
 from colloc.results.comparison import SAME_VALUE, are_one, fourier_series
@@ -45,7 +57,6 @@ from colloc.search.optimise import (
     regularisation_dominated,
 )
 from colloc.search.options import COARSE, FINE, MEDIUM, OPTIONS
-from colloc.search.small_starts import small_loops
 from colloc.system.errors import CollocError, NotConvergedError
 
 
@@ -103,8 +114,8 @@ def explore(problem: Problem, starts: int | None = None) -> Exploration:
     lead to: by default 32, with inertia 96, or fewer once some of them have met the best gait.
 
     Where they shrink until nobody sees them move, the search begins anew among gaits at least as
-    large as the best optimum of finite size (`smallest_shape_speed`); without one, as large as the
-    default guess is, or as is usual. `NotConvergedError` if no start leads anywhere.
+    large as the best optimum of finite size; without one, as large as the default guess is, or as
+    is usual. `NotConvergedError` if no start leads anywhere.
     """
     run = active_run()
     try:
@@ -145,7 +156,6 @@ def explore(problem: Problem, starts: int | None = None) -> Exploration:
 
 @checkpoint
 def farthest_distance(problem: Problem) -> float:
-    """Distance of the farthest gait that a few starts lead to."""
     farthest = problem.with_(objective="distance", least_distance=None, shrinking=True)
     return explore(farthest, OPTIONS.reach_starts).optima[0].value
 
@@ -367,7 +377,7 @@ def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int
         run.report("follow", len(candidates) - len(left), len(candidates), best)
 
     def add(candidate: Candidate) -> bool:
-        """Follow a candidate to its end; return whether that is a new gait."""
+        """Follow a candidate; return whether that led to a new gait."""
         is_new = False
         left.remove(candidate)
         run.ahead.wait_for(follow, problem, candidate.iterate)
@@ -428,3 +438,71 @@ def follow(problem: Problem, iterate: Iterate) -> Iterate:
     space = space_of(problem, np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])])))
     v = space.parameters(iterate.gait)
     return descend(optimise(space, v, iterate.delta, MEDIUM))
+
+
+_SHAPES = 60  # that are drawn, and directions of rates at each
+
+
+@checkpoint
+def small_loops(problem: Problem) -> list[AnyGait]:
+    """Loops of the class that starts are drawn from, both ways round, best first; none where the
+    pace matters."""
+    if problem.froude or not rate_independent(problem.law):
+        return []
+    body, law, joints = problem.body, problem.law, problem.joint_map
+    n, shapes = problem.n_motor, _shapes(problem)
+    directions = np.hstack([one_joint(n, half=False), unit_directions(n, _SHAPES, half=False)])
+    if joints is not None:
+        directions = joints.joint_rates(directions)
+    count, delta = directions.shape[1], 1e-2 * problem.delta_start  # dry
+    angles, rates = np.repeat(shapes, count, axis=1), np.tile(directions, shapes.shape[1])
+    solved = body.solve(law, angles, rates, delta)
+    now = body.motion(law, angles, rates, delta, solved)
+    # around a closed loop every point of the body is carried as far
+    motions = CoulombMotion(angles, rates, now.centre, now.z[2], now.power)
+    # two headings in half a turn, the first of which is no axis of symmetry of usual shapes
+    headings = 0.5 + 0.5 * np.pi * np.arange(2 if law.reversible else 4)
+    best: list[tuple[SmallGait, np.ndarray]] = []
+    for k, shape in enumerate(shapes.T):
+        columns = np.arange(k * count, (k + 1) * count)
+        here = motions.take(columns[solved.converged[columns]])
+        try:
+            first = max((best_mixture(here, h) for h in headings), key=lambda mixture: mixture[0])
+            heading = heading_of(here, first[1])
+            value, weights, _ = best_mixture(here, heading)
+        except NotConvergedError:
+            continue
+        used = weights > 1e-6 * weights.max()
+        # mirror images differ by less
+        if not any(abs(value - other.efficiency) < 1e-3 * value for other, _ in best):
+            best.append((SmallGait(value, heading, here.rates[:, used], weights[used]), shape))
+    best.sort(key=lambda pair: -pair[0].efficiency)
+    seeds, least = problem.gait.start_class, problem.smallest_shape_speed
+    size = 1.5 * 2 * np.pi * least
+    return [
+        to_class(
+            seeds, Corners(small.path(shape, size, back=back)), body, problem.joint_limit, least
+        )
+        for small, shape in best[:2]
+        for back in (False, True)
+    ]
+
+
+def _shapes(problem: Problem) -> np.ndarray:
+    """Distinct admissible mean shapes ``(n_joint, n)`` of gaits of the class."""
+    body, limit, seeds = problem.body, problem.joint_limit, problem.gait.start_class
+    n_joint = body.n_joint
+    levels, rng = np.linspace(-1.0, 1.0, 5), np.random.default_rng(2)
+    drawn = rng.choice(levels, (_SHAPES, n_joint)) * widest(limit)
+    none, rest = np.zeros((n_joint, 1)), seeds.offset(n_joint)[:, 0]
+    constant = (Fourier(mean, none, none) for mean in drawn)
+    means = np.array([seeds.member(seeds.parameters(each), n_joint).mean for each in constant])
+    # of a shape and its mirror image, the one whose first bend is to the left
+    first = np.take_along_axis(means, (means != 0).argmax(axis=1)[:, None], axis=1)
+    means = np.unique(np.where(first < 0, -means, means) + 0.0, axis=0)
+    factors = (
+        min(1.0, largest_factor(body, limit, mean[:, None], rest[:, None])) for mean in means
+    )
+    return np.array(
+        [rest + (mean - rest) * factor for mean, factor in zip(means, factors, strict=True)]
+    ).T

@@ -49,8 +49,6 @@ _PART = 0.3  # of the largest change, that is named
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """Friction identified from a motion."""
-
     problem: Problem = field(repr=False)  # with this friction
     coefficients: dict[str, tuple[float, float]]
     """Values and errors, two standard deviations; these are infinite where the motion does not tell

@@ -12,10 +12,7 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from colloc.numerics.repeated import (
-    least_squares_multipliers,
-    quasi_definite_factors,
-)
+from colloc.numerics.repeated import least_squares_multipliers
 from colloc.numerics.sqp import keep_last
 from colloc.search.options import TOLERANCES
 from colloc.system.interruption import interruptible, is_interrupted
@@ -58,7 +55,6 @@ class NlpResult:
     excess: np.ndarray  # violation of each constraint, (m,)
 
     def accumulate(self, earlier: NlpResult) -> NlpResult:
-        """This result with the iterations and seconds of an earlier solve added."""
         iterations, seconds = self.iterations + earlier.iterations, self.seconds + earlier.seconds
         return replace(self, iterations=iterations, seconds=seconds)
 
@@ -198,21 +194,22 @@ def solve_in_regions(
     """Optimum of successive trust regions, each about the last one's end, with shape limits at the
     worst instants there; and the program of the last region. There are at most twenty: gaits of
     three joints go 2 rad and more."""
-    result: NlpResult | None = None
-    p = program.layout.decisions
+    result, p = (
+        Solver(program, options).solve_within(x, delta, None, radius),
+        program.layout.decisions,
+    )
     for _ in range(20):
-        last = Solver(program, options).solve_within(x, delta, None, radius)
-        result = last if result is None else last.accumulate(result)
         # the barrier keeps off the edge of the region
         if not result.optimal or np.abs(result.x[p] - x[p]).max() < 0.999 * radius:
             return program, result
         program, x = program.moved_to(result.x)
-    assert result is not None
+        further = Solver(program, options).solve_within(x, delta, None, radius)
+        result = further.accumulate(result)
     return program, replace(result, complementarity=np.inf, status="still moving")
 
 
 class StopRequest(ca.Callback):
-    """The ``iteration_callback`` of nlpsol: ends IPOPT once Ctrl-C came."""
+    """Ends IPOPT once Ctrl-C came."""
 
     def __init__(self, nlp: Mapping[str, ca.MX]) -> None:
         ca.Callback.__init__(self)
@@ -335,21 +332,3 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
             advice = "ask for a delta of at least 1e-09, below which rounding hides the optimum"
     effort = f"not converged at delta = {delta:.1e} after {result.iterations} iterations"
     return f"{effort}: {failed} ({result.status}). Try to {advice}."
-
-
-def redundant_equations(solver: Solver, x: np.ndarray, delta: float) -> list[str]:
-    """Names of equations that are (nearly) linear combinations of others at x ``(n,)``."""
-    jacobian, equality = solver.equality_jacobian(x, delta)
-    scale = np.sqrt(np.asarray(jacobian.multiply(jacobian).sum(axis=1)).ravel())
-    rows = (sparse.diags(1.0 / np.maximum(scale, 1e-300)) @ jacobian).tocsr()
-    # inverse iteration on rows rows' + eps: the combination of the rows that nearly vanishes
-    factors, n = quasi_definite_factors(rows), rows.shape[1]
-    combination = np.random.default_rng(0).normal(size=equality.size)
-    for _ in range(2):
-        combination = factors.solve(np.concatenate([np.zeros(n), -combination]))[n:]
-        combination /= np.linalg.norm(combination)
-    # the eigenvalue: n intervals that sum up distance have 1.2 / n^2, redundant rows 1e-18
-    if np.linalg.norm(rows.T @ combination) ** 2 > 1e-12:
-        return []
-    suspicious = equality[np.abs(combination) > 0.1 * np.abs(combination).max()]
-    return sorted({_group(solver.program, int(row)) for row in suspicious})

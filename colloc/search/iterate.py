@@ -27,7 +27,7 @@ SPACES = LinearSpace, SearchSpace
 class Iterate:
     """A gait with its first-order conditions."""
 
-    space: SearchSpace  # its problem has the body's panels of this iterate
+    space: SearchSpace
     v: np.ndarray  # parameters in that space, (n,)
     delta: float  # in the units of the class of gaits
     objective: float  # what SQP minimises: minus the value, in units of the friction
@@ -91,19 +91,13 @@ def evaluate_at(
     if program is None:
         program = ReducedProgram(space, delta)
         program.place_rows(v)
-    conditions = conditions or stationarity(program, v)
+    now = conditions or stationarity(program, v)
     objective, period = program.objective(v), program.period(v)
-    stationary = max(conditions.kkt_error, conditions.complementarity) < kkt
-    step = Step(
-        delta,
-        space.mesh.n,
-        *(program.value(objective), period["distance"], period["work"], conditions.kkt_error),
-        optimal=stationary,
-        status=STATIONARY if stationary else NOT_STATIONARY,
-        iterations=iterations,
-        seconds=seconds,
-    )
-    errors = conditions.kkt_error, conditions.violation, conditions.complementarity
+    stationary = max(now.kkt_error, now.complementarity) < kkt
+    numbers = program.value(objective), period["distance"], period["work"], now.kkt_error
+    status = STATIONARY if stationary else NOT_STATIONARY
+    step = Step(delta, space.mesh.n, *numbers, stationary, status, iterations, seconds)
+    errors = now.kkt_error, now.violation, now.complementarity
     return Iterate(space, v, delta, objective, *errors, kkt, hessian, history=(step,))
 
 

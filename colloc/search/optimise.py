@@ -223,13 +223,13 @@ def project_to_zero_rotation(problem: Problem, gait: AnyGait, delta: float) -> A
     """A gait near a given one that turns the body as prescribed and encloses the same area.
 
     Where reversed rates reverse the motion, net rotation and displacement are odd under reversal of
-    the gait. So every retraced gait closes its rotation, goes nowhere and, surrounded by gaits that
-    do not close, is a critical point of the efficiency. Searches that start far from closure fall
-    into them: of 75 starts at (1, 1, 1), (3, 1, 1) and (10, 1, 1), 19. So the rotation is closed
-    first, at constant enclosed area, which a retraced gait lacks: none.
+    the gait. So every retraced gait closes its rotation, goes nowhere and is a critical point of
+    the efficiency, into which searches that start far from closure fall: 19 of 75 starts at (1, 1,
+    1), (3, 1, 1) and (10, 1, 1). With the rotation closed first, at constant enclosed area, which a
+    retraced gait lacks, none does.
 
     The gait itself where a symmetry closes the rotation, nothing prescribes it, or the gait is no
-    Fourier series. Delta is in the units of the class.
+    Fourier series.
     """
     seeds, is_open = problem.gait.start_class, problem.gait.symmetry == NONE
     if not is_open or problem.rotation is None or not gait.is_series or not seeds.linear:

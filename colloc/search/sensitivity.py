@@ -60,8 +60,6 @@ class Again:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """Effect of one number of a problem on the best value."""
-
     name: str
     now: float  # the number
     relative: bool  # whether changes are parts of the number, or of a link for places of feet

@@ -1,9 +1,5 @@
 """Stages from a problem to a certified solution: explore, descend, refine, confirm, certify,
-choose.
-
-Each stage is a function of one value that returns the next one. Retries, time limits and interrupts
-are decided here.
-"""
+choose; retries, time limits and interrupts are decided here."""
 
 from __future__ import annotations
 
@@ -11,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -75,7 +72,14 @@ def solve(
                 solution = certify_answer(reachable, solve_directly(reachable))
             else:
                 solution = _solve(reachable, starts, accept)
-            _say_reach(solution)
+            asked = problem.least_distance
+            least = {aim.name: least for aim, least in reachable.at_least}.get("distance")
+            if asked is not None and least is not None and least < asked:
+                solution.message = (
+                    f"The farthest gait goes {2 * least:.3g} body lengths per cycle, less than the "
+                    f"{asked:g} required, so half of that was required: {least:.3g}. "
+                    f"{solution.message}"
+                ).strip()
     except KeyboardInterrupt:
         clear_interrupt()
         over = time.monotonic() - begin >= seconds
@@ -110,29 +114,20 @@ def _solve(problem: Problem, starts: int | None, accept: Callable[[Iterate], boo
     return solution
 
 
-def _say_reach(solution: Solution) -> None:
-    """Say in the message that no gait goes the `least_distance`."""
-    asked = solution.problem.least_distance
-    least = {aim.name: least for aim, least in solution.problem.at_least}.get("distance")
-    if asked is not None and least is not None and least < asked:
-        solution.message = (
-            f"The farthest gait goes {2 * least:.3g} body lengths per cycle, less than the "
-            f"{asked:g} required, so half of that was required: {least:.3g}. {solution.message}"
-        ).strip()
-
-
 def _finish_best(problem: Problem, optima: Sequence[Iterate]) -> list[Solution]:
     """Solutions of the best optima: of finite size first, then better ones that shrank; all in one
     order where the problem asks for any size. Of each kind, best first, as long as none passes, or
     it lost more on its refined mesh than the next one is behind."""
     solutions: list[Solution] = []
     for shrank in (None,) if problem.shrinking else (False, True):
-        kind, best = optima, -np.inf
-        if shrank is not None:
-            kind = [each for each in optima if is_visible(each.gait) is not shrank]
+        best, least = -np.inf, -np.inf
         if shrank:
             least = max((each.answer.value for each in solutions if passes(each)), default=-np.inf)
-            kind = [each for each in kind if each.value > least]
+        kind = [
+            each
+            for each in optima
+            if shrank is None or (is_visible(each.gait) is not shrank and each.value > least)
+        ]
         for optimum in kind[: OPTIONS.attempts]:
             if optimum.value - OPTIONS.close * abs(optimum.value) < best:
                 break
@@ -180,7 +175,7 @@ def certify_answer(problem: Problem, answer: Answer) -> Solution:
     """A solution with its certificate and message; without a certificate where the gait goes
     nowhere, or cannot be replayed."""
     is_free, text, solution = problem.gait.free, answer.message, Solution(problem, answer)
-    if answer.problem.gait.free and is_trivial(answer):
+    if is_free and is_trivial(answer):
         solution.message = (
             f"no gait was found that climbs a grade of {problem.grade:g}, or goes the way asked "
             f"for. Try a gentler slope, more starts, or more harmonics."
@@ -247,10 +242,7 @@ def choose(problem: Problem, solutions: Sequence[Solution]) -> Solution:
     With dry friction small cycles may go farthest for their work, but nobody can build those: a
     better one that nobody sees move is returned beside it, as `shrunk`.
     """
-
-    def value(solution: Solution) -> float:
-        return solution.answer.value
-
+    value = attrgetter("answer.value")
     passing = [each for each in solutions if passes(each)]
     finite = [each for each in passing if problem.shrinking or is_visible(each.answer.gait)]
     solution = replace(max(finite or passing, key=value, default=solutions[0]))

@@ -20,7 +20,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colloc.dynamics.follow import ONE_SIDED
 from colloc.gaits.objective import EFFICIENCY, Objective, chord_per_way
 from colloc.gaits.regime import LEVEL, Regime
 from colloc.mechanics.bodies import Body
@@ -38,7 +37,7 @@ from colloc.mechanics.solution_branches import FORWARDS, followed_motion
 from colloc.smooth.smooth_body import accurate_motion
 from colloc.system.errors import ProblemError
 from colloc.verification.adaptive_motion import Path, Replay, lever, poses, whole_totals
-from colloc.verification.differential_motion import GaitOnSlope, GaitWithInertia
+from colloc.verification.differential_motion import ONE_SIDED, GaitOnSlope, GaitWithInertia
 
 MOST_INSTANTS = 10_000_000
 """Of a first grid, which fill a gigabyte."""

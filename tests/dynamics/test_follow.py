@@ -9,7 +9,7 @@ import pytest
 import scipy.integrate
 
 from colloc import NotConvergedError
-from colloc.dynamics.follow import integrate_period
+from colloc.verification.differential_motion import integrate_period
 
 TURN = np.array([[0.0, 2.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 BEGIN = np.array([1.0, 0.0, 2.0])

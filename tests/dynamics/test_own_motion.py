@@ -12,7 +12,6 @@ import pytest
 
 from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, load, save
 from colloc.dynamics.dynamics import QuasiStatic, Trajectory
-from colloc.dynamics.follow import integrate_period
 from colloc.gaits import gait_fields
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.regime import Regime
@@ -21,6 +20,7 @@ from colloc.mechanics.fixed_point import chain_motion, motion_and_derivatives, s
 from colloc.numerics.arrays import namespace
 from colloc.search.solve import solve
 from colloc.verification.adaptive_motion import Replay, to_tolerance, whole_totals
+from colloc.verification.differential_motion import integrate_period
 from colloc.verification.mesh_error import ReferenceMotion
 from colloc.verification.replay import replay, replayer
 

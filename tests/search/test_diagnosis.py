@@ -1,7 +1,6 @@
-"""Failures are named in mechanical words, and redundant equations are found before a solve."""
+"""Failures are named in mechanical words."""
 
 import re
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 
 from colloc import Harmonic, ModalBody, Problem, ellipse
 from colloc.mechanics.bodies import FORMULATIONS
-from colloc.search.ipopt import Solver, explanation, redundant_equations, row_meaning
+from colloc.search.ipopt import Solver, explanation, row_meaning
 from tests.shared.stages import program_of
 
 
@@ -55,34 +54,6 @@ def test_a_broken_balance_is_named_with_its_window(formulation, variable):
     assert first <= worst <= last < first + 0.3
     assert first < program.mesh.times[11] < last + 0.125
     assert "Try to" in text
-
-
-def test_a_redundant_rotation_constraint_is_detected():
-    problem = stated()
-    program = program_of(problem)
-    x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
-    solver = Solver(program)
-    assert redundant_equations(solver, x, 0.1) == []
-    # close the rotation twice
-    jacobian, equality = solver.equality_jacobian(x, 0.1)
-    rows = jacobian.tolil()
-    first, second = (
-        int(np.searchsorted(equality, program.groups[name].start))
-        for name in ("angles", "rotation")
-    )
-    rows[first] = rows[second]
-    solver.equality_jacobian = lambda *at: (rows.tocsr(), equality)
-    assert redundant_equations(solver, x, 0.1) == ["angles", "rotation"]
-
-
-def test_the_search_for_redundant_equations_takes_time_in_proportion_to_the_mesh():
-    """Its factors once filled the square of the mesh: 1,000 intervals took minutes and 30 GB."""
-    problem = stated().with_(intervals=600)
-    program = program_of(problem)
-    x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
-    begin = time.process_time()
-    assert redundant_equations(Solver(program), x, 0.1) == []
-    assert time.process_time() - begin < 5.0  # 0.4 s; 20 s with factors that fill
 
 
 def test_a_delta_that_rounding_hides_is_named():

@@ -16,8 +16,7 @@ from colloc.results.comparison import distance
 from colloc.search import explore
 from colloc.search import solve as stages
 from colloc.search.checkpoint import Run
-from colloc.search.explore import multistart
-from colloc.search.small_starts import small_loops
+from colloc.search.explore import multistart, small_loops
 from colloc.search.solve import solve
 from tests.shared.cases import slow
 

@@ -41,9 +41,17 @@ from colloc.studies.cell import (
     start_key,
     value_of,
 )
-from colloc.studies.gait_class import class_name, gait_class, wave_direction, winding
 from colloc.studies.study import read_study_file
-from colloc.studies.sweep import NO_PROBLEM, StudyRun, save_study, study_table
+from colloc.studies.sweep import (
+    NO_PROBLEM,
+    StudyRun,
+    class_name,
+    gait_class,
+    save_study,
+    study_table,
+    wave_direction,
+    winding,
+)
 from colloc.system.task_pool import Lost
 from colloc.verification.replay import replay
 
