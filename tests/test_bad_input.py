@@ -468,7 +468,7 @@ grade=1.0 -> slides down for ever
 froude=0.1, gait=Polygon(4), objective="driven efficiency" -> joint rates jump
 froude=0.1, gait=Harmonic(1), scheme="lobatto-4" -> gauss-N
 froude=0.1, gait=Harmonic(1), formulation="implicit velocity" -> only the formulation
-froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(3, "antipodal") -> own axis of symmetry
+froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(3, "antipodal") -> no antipodal gait of two equal links
 froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(2), rotation=1.0 -> never turn
 froude=(1.0, 0.1) -> the smaller one first
 froude=(-1.0, 0.1) -> above 0

@@ -73,19 +73,19 @@ def _numbers(limit: Any) -> tuple[float, ...]:
     return tuple(float(a) for a in each) if all(map(is_number, each)) else ()
 
 
-def range_of(limit: Any) -> tuple[float, float]:
-    """Least and largest angle of one joint."""
-    return limit if isinstance(limit, tuple) else (-limit, limit)
+def joint_ranges(limit: Limit, n_joint: int) -> np.ndarray:
+    """Least and largest angle of each joint, ``(n_joint, 2)``."""
+    each = limit if isinstance(limit, tuple) else (limit,) * n_joint
+    return np.array([joint if isinstance(joint, tuple) else (-joint, joint) for joint in each])
 
 
 def one_sided(limit: Limit) -> bool:
     """True if a joint may bend farther to one side than to the other."""
-    return isinstance(limit, tuple) and any(isinstance(joint, tuple) for joint in limit)
+    return bool(joint_ranges(limit, 1).sum(axis=1).any())
 
 
 def widest(limit: Limit) -> float:
-    each = limit if isinstance(limit, tuple) else (limit,)
-    return max(float(np.abs(joint).max()) for joint in each)
+    return float(np.abs(joint_ranges(limit, 1)).max())
 
 
 def of_each(limit: Limit | None, n_joint: int) -> tuple[float, ...]:
@@ -100,5 +100,5 @@ def under_one_limit(angles: np.ndarray, limit: Limit) -> tuple[np.ndarray, float
     for all."""
     if not isinstance(limit, tuple):
         return angles, limit
-    low, high = np.array([range_of(joint) for joint in limit]).T[:, :, None]
+    low, high = joint_ranges(limit, len(angles)).T[:, :, None]
     return angles * (widest(limit) / np.where(angles < 0, -low, high)), widest(limit)

@@ -27,6 +27,7 @@ COEFFICIENTS = {
     "power": "power of the speed in friction",
 }
 _SHARES = {"lengths": "length", "weights": "weight", "masses": "mass"}
+_OF_CHAIN = (*_SHARES, "width", "feet")
 _NUMBERS = {
     "joint_limit": "joint limit",
     "speed_limit": "speed limit",
@@ -55,16 +56,16 @@ def parameters(problem: Problem) -> list[Parameter]:
     chain = problem.body if isinstance(problem.body, Chain) else None
     numbers = []
 
-    def add(name: str, value: float, field: str, new: Callable[[float], Any], **how: bool) -> None:
-        def change(by: float) -> Problem:
-            return problem.with_(**{"guess": None, field: new(by)})  # a guess need not fit
-
-        numbers.append(Parameter(name, value, change, **how))
-
-    def add_of_body(
-        name: str, value: float, field: str, new: Callable[[float], Any], **how: bool
+    def add(
+        name: str, value: float, field: str, new: Callable[[float], Any], relative: bool = True
     ) -> None:
-        add(name, value, "body", lambda by: replace(chain, **{field: new(by)}), **how)  # type: ignore[type-var]
+        def change(by: float) -> Problem:
+            part: dict[str, Any] = {field: new(by)}
+            if chain and field in _OF_CHAIN:
+                part = {"body": replace(chain, **part)}
+            return problem.with_(**{"guess": None} | part)  # a guess need not fit
+
+        numbers.append(Parameter(name, value, change, relative))
 
     feet = chain.standing_on if chain else ()
     if not feet or any(foot.friction is None for foot in feet):
@@ -75,12 +76,13 @@ def parameters(problem: Problem) -> list[Parameter]:
         which = _count_from("foot", [k for k, foot in enumerate(feet) if foot.friction == law])
         for field, value in _coefficients(law):
             new = partial(_change_friction_of_feet, feet, law, field)
-            add_of_body(f"{COEFFICIENTS[field]} of {which}", value, "feet", new)
+            add(f"{COEFFICIENTS[field]} of {which}", value, "feet", new)
     if chain:
-        _add_links(chain, problem.gait.symmetry == BILATERAL, add_of_body)
+        mirrored = problem.gait.symmetry == BILATERAL
+        _add_links(chain, mirrored, add)
         if chain.width:
-            add_of_body("width", chain.width, "width", partial(_scale, chain.width))
-        _add_feet(feet, chain.n_link, problem.gait.symmetry == BILATERAL, add_of_body)
+            add("width", chain.width, "width", partial(_scale, chain.width))
+        _add_feet(feet, chain.n_link, mirrored, add)
     for field, words in _NUMBERS.items():
         if stated := getattr(problem, field):
             add(words, _first(stated), field, partial(_scale, stated))
@@ -166,7 +168,7 @@ def _scale_least(at_least: Sequence[Any], which: int, by: float) -> tuple[Any, .
 
 
 def _change_coefficient(law: Any, field: str, by: float) -> Any:
-    return replace(law, **{field: _scale(getattr(law, field), by)})
+    return replace(law, **{field: getattr(law, field) * (1 + by)})
 
 
 def _change_friction_of_feet(

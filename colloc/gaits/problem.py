@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from colloc.gaits import gait_fields
 from colloc.gaits.gait import ANTIPODAL, BILATERAL, NONE, fraction
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, of_each, range_of
+from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, joint_ranges, of_each
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
 from colloc.gaits.prescribed import Prescribed
@@ -241,28 +242,30 @@ class Problem:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
-    def _derive(self) -> None:
+    @cached_property
+    def _usual(self) -> dict[str, Any]:
+        """Values of fields that follow from others, unless they are stated."""
         if self.robot is None:
-            self._fill(objective=EFFICIENCY)
-            return
-        check_kind("robot", self.robot, [Robot])
-        for name in DERIVED:
-            if getattr(self, name) != getattr(type(self), name):
-                raise ProblemError(
-                    f"{name} follows from the robot, in SI units: leave it out, or the robot."
-                )
-        derived = self.robot.dimensionless(self.grade, self.law.smallest)
-        self._fill(objective=derived.pop("objective"))
-        self._set(**derived)
+            return {"objective": EFFICIENCY}
+        return self.robot.dimensionless(self.grade, self.law.smallest)
+
+    def _derive(self) -> None:
+        if self.robot is not None:
+            check_kind("robot", self.robot, [Robot])
+            for name in DERIVED:
+                if getattr(self, name) != getattr(type(self), name):
+                    raise ProblemError(
+                        f"{name} follows from the robot, in SI units: leave it out, or the robot."
+                    )
+            self._set(**{name: self._usual[name] for name in DERIVED})
+        self._fill(objective=self._usual["objective"])
 
     @property
     def derived_fields(self) -> set[str]:
         """Names of the fields that follow from others."""
-        usual, names = EFFICIENCY, set[str]()
-        if self.robot is not None:
-            usual = self.robot.dimensionless(self.grade, self.law.smallest)["objective"]
-            names |= {*DERIVED}
-        return names | {"objective"} if self.objective == usual else names
+        if self.objective == self._usual["objective"]:
+            return {*self._usual}
+        return {*self._usual} - {"objective"}
 
     def _fill(self, **defaults: object) -> None:
         self._set(**{name: x for name, x in defaults.items() if getattr(self, name) is None})
@@ -276,8 +279,7 @@ class Problem:
         if self.delta < SMALLEST_DELTA:
             raise ProblemError(
                 f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: slower speeds are "
-                f"lost in rounding. The paper uses 1e-4, and a certificate states the efficiency "
-                f"for delta -> 0."
+                f"lost in rounding."
             )
         if max(self.delta, self.delta_start) > LARGEST_DELTA:
             raise ProblemError(
@@ -349,9 +351,8 @@ class Problem:
         most = float(np.linalg.norm(self.largest_speeds)) if self.speed_limit else np.inf
         if most <= (least := 2 * np.pi * self.smallest_shape_speed):
             raise ProblemError(
-                f"speed_limit leaves no gait: all joints together move at {most:.3g} rad per "
-                f"period at most, and smallest_shape_speed asks for {least:.3g} on average (2 pi "
-                f"{self.smallest_shape_speed:g}). Make that smaller."
+                f"speed_limit leaves no gait: joints together move at most at {most:.3g} rad per "
+                f"period, and smallest_shape_speed asks for {least:.3g}. Make that smaller."
             )
 
     def _check_gaits(self) -> None:
@@ -364,9 +365,9 @@ class Problem:
             )
         for name in ("joint_limit", "torque_limit", "power_limit", "speed_limit"):
             limit = getattr(self, name)
-            each = [range_of(joint) for joint in limit] if isinstance(limit, tuple) else []
-            order = -1 if symmetry == BILATERAL else 1
-            if symmetry != NONE and each != [(-high, -low) for low, high in each[::order]]:
+            ranges = joint_ranges(0.0 if limit is None else limit, 1)
+            images = -ranges[:: -1 if symmetry == BILATERAL else 1, ::-1]
+            if symmetry != NONE and (ranges != images).any():
                 alike = "mirrored joints" if symmetry == BILATERAL else "to both sides"
                 raise ProblemError(
                     f"gaits of symmetry {symmetry} bend {alike} alike: give them the same {name}."
@@ -398,10 +399,8 @@ class Problem:
             raise ProblemError("two equal links never turn when mu_f = mu_b: rotation must be 0.")
         if self.keeps_heading and symmetry == ANTIPODAL:
             raise ProblemError(
-                "no antipodal gait of two equal links goes anywhere when mu_f = mu_b: the body "
-                "moves along its own axis of symmetry, and as far back while it is bent to the "
-                "other side. Take the class without symmetry, links that differ, or mu_b different "
-                "from mu_f."
+                "no antipodal gait of two equal links goes anywhere when mu_f = mu_b: take the "
+                "class without symmetry, links that differ, or mu_b different from mu_f."
             )
 
     @property

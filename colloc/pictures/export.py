@@ -31,7 +31,7 @@ from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.interpolate import CubicHermiteSpline
 
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.limits import range_of
+from colloc.gaits.limits import joint_ranges
 from colloc.laws.resistance import Elliptic
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth
@@ -402,9 +402,7 @@ def _links(robot: RobotSheet) -> dict[str, Any]:
         "inertias": np.stack([masses * (width**2 + height**2) / 12, upright, upright], axis=1),
         "width": width,
         "height": height,
-        "ranges": [
-            range_of(x) for x in (limit if isinstance(limit, tuple) else (limit,) * chain.n_joint)
-        ],
+        "ranges": joint_ranges(limit, chain.n_joint).tolist(),
     }
 
 

@@ -12,7 +12,6 @@ import dataclasses
 import json
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,7 +25,7 @@ from colloc.gaits.starts import on_speed_floor
 from colloc.results.comparison import are_one, fourier_series
 from colloc.results.solution import CERTIFICATE_FAILED, NOT_CONVERGED, SOLVED, versions
 from colloc.system.errors import StoreError
-from colloc.system.files import lock_file
+from colloc.system.files import alone_in
 from colloc.system.row_file import put_rows, read_rows
 from colloc.system.store_file import Table, save_table
 
@@ -81,11 +80,6 @@ class Outcome:
     cpu_seconds: float = 0.0
     value: float = np.nan
     value_error: float = np.nan
-
-    def __post_init__(self) -> None:
-        for name, usual in (("value", self.efficiency), ("value_error", self.efficiency_error)):
-            if np.isnan(getattr(self, name)):
-                object.__setattr__(self, name, usual)
 
     def __repr__(self) -> str:
         return (
@@ -209,23 +203,19 @@ def _read(path: Path, problem: Problem | None = None) -> Archive | None:
     raise StoreError(f"{row_path(path)} {why}.")
 
 
-def _alone_at(path: Path) -> AbstractContextManager[None]:
-    return lock_file(path.with_name(f".{path.name}.lock"), wait=True)
-
-
 def open_archive(problem: Problem, path: str | os.PathLike[str]) -> Archive:
     """The archive of a problem with this HDF5 file, created if there is none.
 
     `StoreError` if it is damaged, of another problem or version, or cannot be written.
     """
     path = Path(path)
-    with _alone_at(path):
+    with alone_in(path.parent):
         archive = _read(path, problem)
         if archive is None:
             if path.exists():
                 raise StoreError(
-                    f"{path} is there, but not {row_path(path).name}, which a search goes on from "
-                    f"(older ones had none); choose another --output, or move it away."
+                    f"{path} is there, but not {row_path(path).name}, which a search goes on "
+                    f"from; choose another --output, or move it away."
                 )
             put_rows(row_path(path), _ROWS, {"problem": problem.to_dict()})
     return archive or Archive(problem, path)
@@ -249,7 +239,7 @@ def save_archive(archive: Archive, command: str = "") -> Path:
     """Write the HDF5 file of all starts on the disk, which `archive` then holds as well."""
     path, problem = archive.path, archive.problem
     assert path is not None
-    with _alone_at(path):
+    with alone_in(path.parent):
         if stored := _read(path, problem):
             archive.outcomes |= stored.outcomes
         names = sorted(archive.outcomes)

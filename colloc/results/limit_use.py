@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.limits import of_each, range_of, under_one_limit
+from colloc.gaits.limits import joint_ranges, of_each, under_one_limit
 from colloc.gaits.problem import Problem
 from colloc.gaits.robot import SPEED_OF_ROBOT
 from colloc.mechanics.balance import largest_moments
@@ -98,8 +98,7 @@ def _hints(problem: Problem, speed_used: float) -> Iterator[str]:
     series by Bernstein's inequality, powers by both. Binding speed limits: in a period a joint
     swings to and fro by half of what it can cover."""
     n, gait, limit = problem.body.n_joint, problem.gait, problem.joint_limit
-    ranges = map(range_of, limit if isinstance(limit, tuple) else (limit,) * n)
-    half = np.array([0.5 * (high - low) for low, high in ranges])
+    half = 0.5 * np.ptp(joint_ranges(limit, n), axis=1)
     torque, speed = np.full(n, np.inf), np.full(n, np.inf)
     if not problem.froude and isinstance(problem.body, Chain) and rate_independent(problem.law):
         torque = largest_moments(problem.body, problem.friction, problem.grade)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from colloc.dynamics.control_problem import ControlProblem
-from colloc.gaits.limits import Limit, range_of
+from colloc.gaits.limits import Limit, joint_ranges
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.contact import (
     Contact,
@@ -96,9 +96,8 @@ class ShapeChecks:
             self._groups.append(_side_by_side([self.contacts[k] for k in of], body.n_joint))
 
     def bounds(self, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
-        angles = limit if isinstance(limit, tuple) else (limit,) * self.n_angle
         n_rate = len(self.names) - self.n_shape
-        each = [*map(range_of, angles), *[(-np.inf, 0.0)] * len(self.contacts)]
+        each = [*joint_ranges(limit, self.n_angle), *[(-np.inf, 0.0)] * len(self.contacts)]
         lower, upper = np.array([*each, *[(-1.0, 1.0)] * n_rate]).reshape(-1, 2).T
         return lower, upper
 

@@ -61,7 +61,23 @@ def problem(**changes):
 
 
 def outcome(start, gait=GAIT, efficiency=0.2, status=SOLVED):
-    return Outcome(start, status, "", gait, gait, efficiency, 1e-7, 0.1, 0.5, 1e-4, 12, 1.5, 1.25)
+    return Outcome(
+        start,
+        status,
+        "",
+        gait,
+        gait,
+        efficiency,
+        1e-7,
+        0.1,
+        0.5,
+        1e-4,
+        12,
+        1.5,
+        1.25,
+        efficiency,
+        1e-7,
+    )
 
 
 def name(start, seed=0):

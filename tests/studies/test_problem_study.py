@@ -79,7 +79,23 @@ def grid(**changes):
 
 
 def outcome(start, guess, gait, efficiency, status=SOLVED):
-    return Outcome(start, status, "", guess, gait, efficiency, 1e-7, 0.1, 0.5, 1e-4, 3, 0.1, 0.1)
+    return Outcome(
+        start,
+        status,
+        "",
+        guess,
+        gait,
+        efficiency,
+        1e-7,
+        0.1,
+        0.5,
+        1e-4,
+        3,
+        0.1,
+        0.1,
+        efficiency,
+        1e-7,
+    )
 
 
 def landscape(stated, start_from, start, time_limit, **_):
