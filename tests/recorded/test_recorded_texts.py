@@ -146,10 +146,11 @@ def described(figure):
 
 @also
 def pareto():
-    front = ParetoFront(
-        state("robot").problem, (Objective("distance"), state("robot").problem.objective),
-        (state("robot"), state("small")), (Gap(0, "The best gaits are those beside it.", True),),
-    )  # fmt: skip
+    # copies, for commands say of members of a family which file stated them
+    ends = replace(state("robot")), replace(state("small"))
+    gaps = (Gap(0, "The best gaits are those beside it.", True),)
+    aims = Objective("distance"), ends[0].problem.objective
+    front = ParetoFront(ends[0].problem, aims, ends, gaps)
     with patch("colloc.studies.families.pareto_front", return_value=front):
         colloc("pareto", "loop.py", "--no-figure")
     return f"{front!r}\n{front.narrow}\n{described(front.plot())}"
@@ -157,8 +158,8 @@ def pareto():
 
 @also
 def steer():
-    right = state("turning")
-    family = Steering(right.problem, (right.rotation, 0.0), (right, state("loop")), None)
+    right, straight = replace(state("turning")), replace(state("loop"))
+    family = Steering(right.problem, (right.rotation, 0.0), (right, straight), None)
     spot = replace(family, turns=family.turns[:1], points=family.points[:1])
     family = replace(family, on_the_spot=spot)
     with patch("colloc.studies.families.steer", return_value=family):
