@@ -1,7 +1,7 @@
 """Run every problem file for the gallery of the documentation: python -m scripts.gallery [NAME ...]
 
 Writes results/curated/gallery.json (numbers, and what a script prints), and into gallery/ beside it
-the figures and films of those that are scripts. The test tests/commands/test_gallery.py runs the
+the figures and films of those that are scripts. The test tests/test_examples.py runs the
 same files and holds them against these numbers and their REFERENCE.
 """
 

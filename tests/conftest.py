@@ -89,24 +89,10 @@ def guess_in_balance(problem):
     parameters = program.control.admissible.parameters(problem.guess)
     x = program.feasible(parameters, problem.delta)
     gait, mesh, x = program.member(x), program.mesh, x[: program.layout.n]
-    fine = replay(
-        problem.body,
-        problem.friction,
-        lambda t: (gait.angles(t), gait.rates(t)),
-        problem.delta,
-        instants=200,
-    )
+    fine = replay(problem.body, problem.friction, gait, problem.delta, instants=200)
     measured = {"value": fine.efficiency, "distance": fine.distance, "work": fine.work}
-    conditions = {
-        "kkt_error": 1.0,
-        "violation": 1.0,
-        "complementarity": 0.0,
-        "optimal": False,
-        "status": "guess",
-    }
-    answer = Answer(
-        problem, gait, problem.delta, mesh.edges, mesh.scheme.name, x, 0 * x,
-        np.zeros_like(program.row_lower),
-        **measured, **conditions, iterations=0, seconds=0.0,
-    )  # fmt: skip
+    off = {"kkt_error": 1.0, "violation": 1.0, "complementarity": 0.0, "optimal": False}
+    effort = {"status": "guess", "iterations": 0, "seconds": 0.0}
+    at = problem, gait, problem.delta, mesh.edges, mesh.scheme.name, x
+    answer = Answer(*at, 0 * x, np.zeros_like(program.row_lower), **measured, **off, **effort)
     return Solution(problem, answer, message="only a guess.")

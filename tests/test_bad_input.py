@@ -550,19 +550,13 @@ def test_what_lies_beside_it_is_taken(fields):
     assert Problem.from_dict(problem.to_dict()).hash == problem.hash
 
 
-@pytest.mark.parametrize(
-    ("name", "taken"),
-    [(f"tiny.{end}", False) for end in ("interrupted", "FAILED", "starts", "run", "shrunk")]
-    + [
-        (name, False)
-        for name in ("x" * 300, "x.front", "x.start-7", "x.former-2", ".", "..", "--help", "-x")
-    ]
-    + [(name, True) for name in ("tiny.failed.2", "partial", "x.start", "_", "3.5", "a--help")],
-)
-def test_names_of_files_that_colloc_makes_beside_results_are_refused(name, taken):
-    if taken:
+def test_names_of_files_that_colloc_makes_beside_results_are_refused():
+    for name in ["tiny.failed.2", "partial", "x.start", "_", "3.5", "a--help"]:
         assert Problem(name).name == name
-    else:
+    made = (
+        "tiny.interrupted tiny.FAILED tiny.starts tiny.run tiny.shrunk x.front x.start-7 x.former-2"
+    )
+    for name in (*made.split(), "x" * 300, ".", "..", "--help", "-x"):
         with pytest.raises(ProblemError, match=r"name must (not end|be at most 200 letters)"):
             Problem(name)
 

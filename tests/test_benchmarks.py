@@ -3,25 +3,10 @@
 import numpy as np
 import pytest
 
+from benchmarks import published, zoo
 from benchmarks.peer_table import OPTIMA, judged
 from benchmarks.peers import drag, physics
 from benchmarks.peers.starts import feasible_motion, starts
-from benchmarks.published import (
-    link_ratio,
-    number,
-    scallop,
-    small_stroke,
-    small_wave,
-    wave_of_bending,
-)
-from benchmarks.zoo import (
-    best_serpenoid,
-    described,
-    law_problem,
-    modal_problem,
-    robot_problem,
-    zoo_problem,
-)
 from colloc import Chain, Friction, ellipse, evaluate, replay
 from colloc.mechanics.balance import instant, net_force, total_power
 from scripts.models.ellipses import admissible
@@ -63,19 +48,19 @@ def test_a_run_is_judged_by_the_replay_of_its_gait():
 
 
 def test_rows_about_published_results_judge_by_the_published_digits():
-    assert number("", "", 0.259, 0.2600, 1.5e-3).holds
-    differs = number("", "", 0.094, 0.1000, 1.5e-3, "why")
+    assert published.number("", "", 0.259, 0.2600, 1.5e-3).holds
+    differs = published.number("", "", 0.094, 0.1000, 1.5e-3, "why")
     assert differs.cells[-1] == "+0.006; why; **differs**"
-    assert scallop().holds
-    assert small_stroke().holds
-    assert small_wave().holds
+    assert published.scallop().holds
+    assert published.small_stroke().holds
+    assert published.small_wave().holds
 
 
 @pytest.mark.slow
 def test_purcells_swimmers_have_the_link_ratio_and_the_wave_of_the_papers():
     """A gain of roughly 60 %; a wave of the shortest possible length, three links: 120 degrees."""
-    assert link_ratio().holds
-    assert wave_of_bending(8).holds
+    assert published.link_ratio().holds
+    assert published.wave_of_bending(8).holds
 
 
 def test_the_swimmer_written_apart_has_the_small_strokes_of_a_closed_form():
@@ -89,16 +74,16 @@ def test_the_numbers_of_the_zoo_keep_their_problems_and_all_families_are_stated(
     lengths = "0.1712, 0.1186, 0.2235, 0.1596, 0.3273"
     paths = "periodic B-splines of degree 4, 24 knots, symmetry none, within 3.14"
     body = f"links of lengths {lengths} from the tail [body lengths]"
-    assert described(zoo_problem(99)) == f"{body}, friction (5.95461, 1, 1) {paths}"
-    kinds = {type(law_problem(k).friction).__name__ for k in range(10)}
+    assert zoo.described(zoo.zoo_problem(99)) == f"{body}, friction (5.95461, 1, 1) {paths}"
+    kinds = {type(zoo.law_problem(k).friction).__name__ for k in range(10)}
     assert kinds == {"Elliptic", "Viscous", "PowerLaw", "OwnLaw", "Friction"}
-    assert law_problem(7).hash == law_problem(7).hash != law_problem(2).hash
-    assert described(modal_problem(0)).startswith("smooth, 2 legendre modes")
-    assert {modal_problem(k).body.modes for k in range(20)} == {2, 3, 4, 5, 6}
+    assert zoo.law_problem(7).hash == zoo.law_problem(7).hash != zoo.law_problem(2).hash
+    assert zoo.described(zoo.modal_problem(0)).startswith("smooth, 2 legendre modes")
+    assert {zoo.modal_problem(k).body.modes for k in range(20)} == {2, 3, 4, 5, 6}
 
 
 def test_ten_robots_have_all_numbers_of_links_and_those_of_few_stand_on_all_floors():
-    robots = [robot_problem(k) for k in range(10)]
+    robots = [zoo.robot_problem(k) for k in range(10)]
     assert {robot.body.n_link for robot in robots} == {*range(3, 13)}
     few = [robot.body.feet for robot in robots if robot.body.n_link < 7]
     rolls = [{foot.friction is not None for foot in feet} for feet in few]
@@ -107,8 +92,8 @@ def test_ten_robots_have_all_numbers_of_links_and_those_of_few_stand_on_all_floo
 
 @pytest.mark.slow
 def test_the_best_serpenoid_of_a_robot_is_a_wave_within_its_limits_that_is_worth_as_much_replayed():
-    robot = robot_problem(44)
-    wave = best_serpenoid(robot)
+    robot = zoo.robot_problem(44)
+    wave = zoo.best_serpenoid(robot)
     assert wave.violation < 1e-3
     assert np.abs(wave.gait.angles(np.arange(100) / 100)).max() <= np.min(robot.joint_limit)
     phases = np.unwrap(np.angle(wave.gait.cos - 1j * wave.gait.sin)[:, 0])

@@ -1,5 +1,6 @@
 """The site of the documentation: what its hooks make of a page."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -24,28 +25,25 @@ def shown(markdown, page="tutorial.md"):
     )
 
 
-@pytest.mark.parametrize(
-    ("link", "page", "becomes"),
-    [
-        ("[a](notebook.ipynb)", "tutorial.md", "[a](notebook.md)"),
-        ("[a](notebook.ipynb)", "notebook.md", "[a](notebook.ipynb)"),
-        ("[a](../problems)", "index.md", "[a](gallery.md)"),
-        ("[a](../../colloc/__init__.py)", "howto/scripts.md", "[a](../api.md)"),
-        ("[a](../limits.md#files)", "howto/check.md", "[a](../limits.md#files)"),
-        ("![a](../../results/curated/x.png)", "howto/report.md", "![a](../curated/x.png)"),
-        ("[a](../results/curated/gallery.json)", "known.md", "a (`results/curated/gallery.json`)"),
-        (
-            "[`kernel.c`](../colloc/mechanics/native/kernel.c)",
-            "known.md",
-            "`colloc/mechanics/native/kernel.c`",
-        ),
-        ("[a](https://example.org/x)", "known.md", "[a](https://example.org/x)"),
-        ("[a](#files)", "limits.md", "[a](#files)"),
-        ("[a](../../docs/bound.md)", "curated/frontier.md", "[a](../bound.md)"),
-        ("![a](gallery.png)", "curated/frontier.md", "![a](../curated/gallery.png)"),
-    ],
-)
-def test_a_link_of_the_repository_leads_to_the_page_that_shows_it(link, page, becomes):
+LINKS = """
+[a](notebook.ipynb) in tutorial.md: [a](notebook.md)
+[a](notebook.ipynb) in notebook.md: [a](notebook.ipynb)
+[a](../problems) in index.md: [a](gallery.md)
+[a](../../colloc/__init__.py) in howto/scripts.md: [a](../api.md)
+[a](../limits.md#files) in howto/check.md: [a](../limits.md#files)
+![a](../../results/curated/x.png) in howto/report.md: ![a](../curated/x.png)
+[a](../results/curated/gallery.json) in known.md: a (`results/curated/gallery.json`)
+[`kernel.c`](../colloc/mechanics/native/kernel.c) in known.md: `colloc/mechanics/native/kernel.c`
+[a](https://example.org/x) in known.md: [a](https://example.org/x)
+[a](#files) in limits.md: [a](#files)
+[a](../../docs/bound.md) in curated/frontier.md: [a](../bound.md)
+![a](gallery.png) in curated/frontier.md: ![a](../curated/gallery.png)
+"""
+
+
+@pytest.mark.parametrize("row", LINKS.strip().splitlines())
+def test_a_link_of_the_repository_leads_to_the_page_that_shows_it(row):
+    link, page, becomes = re.fullmatch(r"(.*) in (.*?): (.*)", row).groups()
     assert shown(link, page) == becomes
 
 

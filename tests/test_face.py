@@ -28,7 +28,6 @@ QUICK = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2
 
 
 def python(code):
-    """What a new process prints."""
     command = [sys.executable, "-c", code]
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 

@@ -17,7 +17,7 @@ from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline, large
 from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, smallest_maximum
 from colloc.mechanics.balance import instant, total_power
 from research.small_gaits import balanced_motion, small_gait
-from tests.shared.laws import coulomb
+from tests.shared.mechanics import coulomb
 
 FRICTIONS = [(1.0, 1.0, 1.0), (3.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0)]
 
@@ -150,7 +150,6 @@ def test_rows_are_the_gain_and_its_derivatives():
 )
 @pytest.mark.parametrize("mu", FRICTIONS)
 def test_mirror_images_and_end_swap_move_alike(mu, lengths):
-    """The symmetries that halve the unknowns hold for solved motions."""
     friction, body, rng = coulomb(*mu), Chain(lengths), np.random.default_rng(9)
     q, r = rng.uniform(-2.0, 2.0, (body.n_joint, 80)), rng.normal(size=(body.n_joint, 80))
     space = PotentialSpace(
@@ -206,7 +205,6 @@ def test_two_links_with_directed_friction_can_and_obey_the_coefficient_bound():
 
 
 def test_minimax_program_agrees_with_a_simplex_solver():
-    """Against HiGHS, and its multipliers as a proof of the value (weak duality)."""
     rng = np.random.default_rng(15)
     rows, constants = rng.standard_normal((60, 8)), rng.uniform(0.0, 1.0, 60)
     best = smallest_maximum(sparse.csr_matrix(rows), constants, sparse.csr_matrix((8, 8)))

@@ -1,5 +1,5 @@
-"""Commands end in a sentence and an exit code: early Ctrl-C, full disks, encodings, odd names,
-broken caches."""
+"""Commands end in a sentence and an exit code: early Ctrl-C, full disks, encodings, odd names, broken
+caches; without a home, a language or a place to keep code."""
 
 import io
 import json
@@ -15,6 +15,7 @@ from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 
+import casadi
 import pytest
 
 from colloc import Chain, Harmonic, Problem, ProblemError, StoreError, load, save
@@ -32,6 +33,7 @@ from tests.shared.cases import slow
 QUICK = """
 from colloc import *
 PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"), delta=0.3, delta_start=0.3, intervals=12)
+STARTS = 1
 """
 posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and permissions")
 needs_full = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such device")
@@ -64,7 +66,6 @@ def solve(quick, capsys):
 
 
 def python(*words, stdout=subprocess.PIPE, **options):
-    """A run of Python in a process of its own; its exit code, output and errors."""
     streams = {"stdout": stdout, "stderr": subprocess.PIPE, "text": True}
     done = subprocess.run([sys.executable, *map(str, words)], **streams, **options)
     return done.returncode, done.stdout, done.stderr
@@ -74,10 +75,10 @@ def python(*words, stdout=subprocess.PIPE, **options):
 @pytest.mark.parametrize(
     ("module", "words"),
     [
-        *(("argparse", "colloc.solve x"), ("dataclasses", "colloc verify --json x")),
-        *((library, "colloc solve quick.py") for library in ("numpy", "casadi")),
+        ("argparse", "colloc.solve x"), ("dataclasses", "colloc verify --json x"),
+        ("numpy", "colloc solve quick.py"), ("casadi", "colloc solve quick.py"),
     ],
-)
+)  # fmt: skip
 def test_ctrl_c_while_libraries_are_imported_ends_without_a_traceback(
     module, words, quick, tmp_path
 ):
@@ -253,17 +254,11 @@ def test_a_command_that_was_interrupted_says_so_whatever_became_of_the_interrupt
 
 
 @pytest.mark.parametrize(
-    "words",
-    [
-        "report RESULT",
-        "animate RESULT --periods 1 --seconds 0.3 --fps 10 --width 200",
-        "export RESULT --period 4",
-        "verify RESULT --compare RESULT",
-        "verify RESULT",
-    ],
+    "words", ["report", "animate --periods 1 --seconds 0.3 --width 200", "export --period 4"]
 )
 def test_json_is_one_object_on_standard_output(words, result, capsys):
-    assert colloc([*words.replace("RESULT", str(result)).split(), "--json"]) == 0
+    command, *options = words.split()
+    assert colloc([command, str(result), *options, "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert "bytes" not in said or os.path.getsize(said["file"]) == said["bytes"]
 
@@ -403,3 +398,92 @@ def test_an_interrupted_command_goes_on_from_its_last_problem(name, tmp_path, mo
     assert colloc(command) == 0
     assert set(computed) == {second}
     assert not list(tmp_path.glob("**/*.sqlite"))
+
+
+LETTERS = """# Länge der Schlange: µ_t = 1
+from colloc import *
+PROBLEM = Problem("quick", ellipse(0.0, 1.4, 0.8), gait=Harmonic(1, "bilateral"), delta=0.3, delta_start=0.3, intervals=12)
+STARTS = 1
+"""
+
+
+def run(words, without=(), **environment):
+    """``colloc`` in a process of its own whose environment has been changed."""
+    kept = {name: value for name, value in os.environ.items() if name not in without}
+    return subprocess.run(
+        [sys.executable, "-m", "colloc", *map(str, words)],
+        capture_output=True,
+        env=kept | environment,
+    )
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A folder with blanks and letters beyond ASCII in its name, and a problem in it."""
+    folder = tmp_path / "a földer, 名前"
+    folder.mkdir()
+    (folder / "quick.py").write_text(LETTERS, encoding="utf-8")
+    return folder
+
+
+NO_LANGUAGE = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"}
+# CasADi before 3.8 ends the process where Python cannot read the name of the folder that it is in
+if casadi.__file__.isascii() or [*map(int, casadi.__version__.split(".")[:2])] >= [3, 8]:
+    NO_LANGUAGE["PYTHONUTF8"] = "0"
+NO_CACHE = {"XDG_CACHE_HOME": "/proc/nowhere", "MPLCONFIGDIR": "/proc/nowhere"}
+OF_A_USER = ("HOME", "USER", "LOGNAME", "XDG_CACHE_HOME", "LANG")
+
+
+def solved_and_verified(place, words, without, environment):
+    done = run(
+        ["solve", place / "quick.py", "--output", f"{place}/", *words], without, **environment
+    )
+    assert done.returncode in (0, 4), done.stderr
+    assert b"Traceback" not in done.stderr
+    result = next(place.glob("quick*.h5"))
+    assert load(result).source == LETTERS
+    checked = run(["verify", result], without, **environment)
+    assert checked.returncode == done.returncode
+    slowly = b"colloc: the balance is solved by NumPy, 10 to 60 times more slowly: "
+    assert checked.stderr == b"" or (
+        checked.stderr.startswith(slowly) and checked.stderr.count(b"\n") == 1
+    )
+
+
+@posix
+def test_a_solve_needs_nothing_of_the_user(place):
+    solved_and_verified(
+        place, ["--no-figure"], OF_A_USER, {**NO_LANGUAGE, "PYTHONIOENCODING": "cp1252"}
+    )
+
+
+@posix
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("without", "environment"),
+    [((), NO_LANGUAGE), ((), {"PYTHONIOENCODING": "cp1252"}), (OF_A_USER, {}), ((), NO_CACHE)],
+    ids=["no language", "Windows letters", "no home", "no cache"],
+)
+def test_nor_does_a_figure(without, environment, place):
+    solved_and_verified(place, [], without, environment)
+
+
+@posix
+@pytest.mark.slow
+def test_text_files_are_utf_8_whatever_the_language(place, three_link):
+    result = save(three_link, place / "Länge.h5")
+    for words, name in (
+        (["export", result, "--period", "4"], "*.csv"),
+        (["report", result], "*.html"),
+    ):
+        done = run([*words, "--output", f"{place}/"], **NO_LANGUAGE)
+        assert done.returncode == 0, done.stderr
+        (written,) = place.glob(name)
+        written.read_text(encoding="utf-8")
+
+
+@posix
+def test_a_name_as_long_as_systems_allow_is_kept(three_link, tmp_path):
+    # 203 bytes; with those of the temporary file below 255
+    path = save(three_link, tmp_path / ("ä" * 100 + ".h5"))
+    assert load(path).certificate == three_link.certificate

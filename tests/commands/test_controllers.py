@@ -28,23 +28,16 @@ def sent(three_link, tmp_path):
 
 def angles_of(path):
     data = json.loads((path.parent / "x.json").read_text())
-    return (
-        np.array(data["time_s"]),
-        np.array(data["angles_rad"]),
-        np.array(data["speeds_rad_per_s"]),
-    )
+    return [np.array(data[name]) for name in ("angles_rad", "speeds_rad_per_s")]
 
 
+CLAMP = "--clamp 1000 2000 900 3000"
+CLAMPED = np.array([[1000, 900], [2000, 3000]])[..., None]
 PULSES = {
     "": (1500, 100 / 9, (1, 1), (500, 2500)),
     "--sign 1 -1": (1500, 100 / 9, (1, -1), (500, 2500)),
     "--neutral 2048 --scale 11.378": (2048, 11.378, (1, 1), (-np.inf, np.inf)),
-    "--scale 8 10 --neutral 1500 1480 --clamp 1000 2000 900 3000": (
-        (1500, 1480),
-        (8, 10),
-        (1, 1),
-        np.array([[1000, 900], [2000, 3000]]).reshape(2, 2, 1),
-    ),
+    f"--scale 8 10 --neutral 1500 1480 {CLAMP}": ((1500, 1480), (8, 10), (1, 1), CLAMPED),
 }
 
 
@@ -52,7 +45,7 @@ PULSES = {
 def test_pulses_are_those_of_the_angles_and_what_is_clamped_is_said(options, sent, capsys):
     path = sent(f"--format pulses {options}", "x.pulses.csv")
     neutral, scale, sign, (low, high) = PULSES[options]
-    _, angles, _ = angles_of(path)
+    angles, _ = angles_of(path)
     neutral, scale, sign = (np.resize(x, 2)[:, None] for x in (neutral, scale, sign))
     wanted = neutral + sign * scale * angles * 180 / np.pi
     table = pandas.read_csv(path, comment="#")
@@ -90,7 +83,7 @@ def test_a_message_of_ros_begins_and_ends_straight_at_rest_with_the_gait_between
     np.testing.assert_allclose(time, np.arange(len(time)) / 25, atol=1e-9)
     assert not speeds[:, [0, -1]].any()
     assert np.abs(angles[:, [0, -1]]).max() < 1e-4
-    _, before, fast = angles_of(path)  # the way in, and a period
+    before, fast = angles_of(path)  # the way in, and a period
     n = before.shape[1]
     np.testing.assert_allclose(angles[:, :n], before, atol=1e-6)
     np.testing.assert_allclose(speeds[:, :n], fast, atol=1e-6)
@@ -124,7 +117,7 @@ def test_c_compiles_without_a_warning_and_holds_the_same(options, sent, tmp_path
     printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
     head, *rows = printed.splitlines()
     assert head == "2 25 4"
-    _, angles, _ = angles_of(path)
+    angles, _ = angles_of(path)
     wanted = 40000 - 10 * np.degrees(angles) if options else angles
     rows = np.array([row.split() for row in rows], dtype=float).T
     assert rows.shape == angles.shape

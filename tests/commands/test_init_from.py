@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from itertools import product
 
 import numpy as np
 import pytest
@@ -71,15 +72,11 @@ def test_a_urdf_is_the_chain_that_one_computes_by_hand(tmp_path, capsys):
 
 def test_what_is_fixed_is_one_link_and_a_chain_may_begin_anywhere(tmp_path):
     box = '<visual><geometry><box size="0.2 0.1 0.1"/></geometry></visual>'
+    ahead = box.replace("<geometry>", '<origin xyz="0.1 0 0"/><geometry>')
     turned = [
         link("base", 0.3, more=box),  # from -0.1 to 0.1
         link("cap", 0.1),
-        link(
-            "front",
-            0.2,
-            "0.1 0 0",
-            more=box.replace("<geometry>", '<origin xyz="0.1 0 0"/><geometry>'),
-        ),
+        link("front", 0.2, "0.1 0 0", more=ahead),
         link("rear", 0.2, "-0.1 0 0"),
         joint("lid", "base", "cap", "0 0 0.05", kind="fixed"),
         joint("ahead", "base", "front", "0.1 0 0", limit='<limit lower="-1" upper="0.4"/>'),
@@ -96,23 +93,11 @@ def test_what_is_fixed_is_one_link_and_a_chain_may_begin_anywhere(tmp_path):
 
 
 def test_free_hinges_across_are_wheels_and_spheres_under_a_box_feet(tmp_path):
-    wheels = [
-        each
-        for name in LINKS
-        for side in (-1, 1)
-        for each in (
-            link(f"w{name}{side}", 0.01),
-            joint(
-                f"a{name}{side}",
-                name,
-                f"w{name}{side}",
-                f"0.05 {0.02 * side} 0",
-                "0 1 0",
-                "continuous",
-                "",
-            ),
-        )
-    ]
+    wheels = []
+    for name in LINKS:
+        for side in (-1, 1):
+            wheel, how = f"{name}{side}", (f"0.05 {0.02 * side} 0", "0 1 0", "continuous", "")
+            wheels += [link(wheel, 0.01), joint(f"axle of {wheel}", name, wheel, *how)]
     problem = read(tmp_path, [*WORM, *wheels], "--mu", "0.4")
     offsets = sorted(foot.offset * 0.32 for foot in problem.body.feet)
     assert offsets == pytest.approx([-0.02] * 3 + [0.02] * 3)
@@ -143,13 +128,10 @@ THERE = {
 }
 
 
-@pytest.mark.parametrize(
-    ("kind", "body"),
-    slow_but(
-        [("urdf", "strips"), ("xml", "weights"), ("urdf", "feet")],
-        [(kind, body) for kind in ("urdf", "xml") for body in THERE],
-    ),
-)
+QUICK = [("urdf", "strips"), ("xml", "weights"), ("urdf", "feet")]
+
+
+@pytest.mark.parametrize(("kind", "body"), slow_but(QUICK, product(("urdf", "xml"), THERE)))
 def test_a_model_that_colloc_writes_is_read_as_the_same_body(kind, body, tmp_path):
     body = THERE[body]
     limits = ((-1.0, 1.4), *(1.1, 1.2)[: body.n_joint - 1])
@@ -170,14 +152,10 @@ def test_a_model_that_colloc_writes_is_read_as_the_same_body(kind, body, tmp_pat
 
 
 def test_wheels_and_pads_come_back_from_mjcf(tmp_path):
-    parts = (
-        *(
-            Wheel(k, 0.4, 0.05, 0.8, angle=0.3 * side, offset=0.05 * side, axle=k == 2)
-            for k in (0, 2)
-            for side in (-1, 1)
-        ),
-        Pad(1, 0.2, 0.7),
-    )
+    parts = [Pad(1, 0.2, 0.7)]
+    for k, side in ((0, -1), (0, 1), (2, -1), (2, 1)):
+        at = {"angle": 0.3 * side, "offset": 0.05 * side}
+        parts.append(Wheel(k, 0.4, 0.05, 0.8, axle=k == 2, **at))
     at = {"gait": Harmonic(1, "none"), "delta": 0.1, "mesh_tolerance": 1e-2}
     problem = Problem("there", body=Chain(feet=parts), **at)
     gait = colloc.Fourier(np.zeros(2), 0.6 * np.eye(2)[:, :1], 0.6 * np.eye(2)[:, 1:])

@@ -9,18 +9,10 @@ from colloc.mechanics import solution_branches
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import chain_motion
-from colloc.mechanics.solution_branches import (
-    BACKWARDS,
-    DISTINCT,
-    FORWARDS,
-    Branches,
-    all_balanced_velocities,
-    followed_motion,
-    on_one_branch,
-)
+from colloc.mechanics.solution_branches import BACKWARDS, FORWARDS, all_balanced_velocities
 from colloc.verification.adaptive_motion import fine_motion
-from tests.shared.laws import coulomb
-from tests.shared.without_kernel import numpy_instead
+from tests.shared.cases import slow
+from tests.shared.mechanics import coulomb, numpy_instead
 
 BODY, STEEP = Chain(), Friction(mu_t=100, mu_f=1, mu_b=1)
 
@@ -55,12 +47,14 @@ def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
     found = replay(BODY, STEEP, path, 1e-4, instants=1600, most_instants=1600)
     assert 0.02 < several <= found.several + 1e-3
     assert found.several < several + 0.005
-    moves, turns, _ = followed_motion(Instants(BODY, STEEP, *path(t), 1e-4))[1].mean(axis=1)
+    moves, turns, _ = solution_branches.followed_motion(Instants(BODY, STEEP, *path(t), 1e-4))[
+        1
+    ].mean(axis=1)
     assert turns < found.others["rotation"] < 1.2 * turns
     assert found.others["distance"] > moves + turns * found.distance
 
 
-@pytest.mark.parametrize("sense", [FORWARDS, pytest.param(BACKWARDS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("sense", [FORWARDS, slow(BACKWARDS)])
 def test_the_replay_follows_the_branch_in_time(sense):
     at = BODY, STEEP, random_path(5), 1e-4
     followed, other = (replay(*at, sense=s) for s in (sense, -sense))
@@ -84,7 +78,7 @@ def test_velocities_put_on_one_branch_are_of_motions_that_last(seed):
         return (every.sign[which, at] > 0) | (every.number == 1)
 
     assert not lasting(alone).all()
-    assert lasting(on_one_branch(BODY, STEEP, angles, rates, 1e-4, alone)).all()
+    assert lasting(solution_branches.on_one_branch(BODY, STEEP, angles, rates, 1e-4, alone)).all()
 
 
 @pytest.mark.parametrize("seed", [3, 5])
@@ -97,19 +91,13 @@ def test_the_adaptive_motion_follows_the_branch_that_the_replay_follows(seed):
 
 @pytest.mark.parametrize(
     ("law", "seeds"),
-    [
-        ((100, 1, 1), (0, 2, 3, 4)),
-        ((10, 1, 1), (2, 3, 4)),
-        pytest.param((1, 0.01, 100), (2, 8), marks=pytest.mark.slow),
-    ],
+    [((100, 1, 1), (0, 2, 3, 4)), ((10, 1, 1), (2, 3, 4)), slow(((1, 0.01, 100), (2, 8)))],
 )
 def test_the_stated_error_covers_both_directions(law, seeds):
     """All of these but seeds 4 and 8 run through shapes with several motions."""
     for seed in seeds:
-        at, how = (
-            (BODY, coulomb(*law), random_path(seed), 1e-4),
-            {"tolerance": 1e-4, "instants": 800},
-        )
+        at = BODY, coulomb(*law), random_path(seed), 1e-4
+        how = {"tolerance": 1e-4, "instants": 800}
         forwards, backwards = (replay(*at, sense=s, **how) for s in (FORWARDS, BACKWARDS))
         for known, other in ((forwards, backwards), (backwards, forwards)):
             allowed = known.error + other.error + known.ambiguity
@@ -123,7 +111,9 @@ def test_the_stated_error_covers_both_directions(law, seeds):
 def test_a_period_that_is_open_at_its_ends_is_followed_around_them():
     """The phase at which a period begins changes neither its work nor its rotation."""
     path, t = random_path(3), np.arange(2000) / 2000
-    several = followed_motion(Instants(BODY, STEEP, *path(t), 1e-4))[1].any(axis=0)
+    several = solution_branches.followed_motion(Instants(BODY, STEEP, *path(t), 1e-4))[1].any(
+        axis=0
+    )
     middle = t[np.flatnonzero(several)[several.sum() // 4]]
     paths = path, lambda s: path((s + middle) % 1.0)
     first, shifted = (replay(BODY, STEEP, each, 1e-4, tolerance=1e-4) for each in paths)
@@ -140,13 +130,13 @@ def test_an_instant_without_any_balance_is_said_to_have_none(monkeypatch):
         found = all_balanced_velocities(*at)
         z, sign = found.z.copy(), found.sign.copy()
         z[:, :, 3], sign[:, 3] = np.nan, 0.0
-        return Branches(z, sign)
+        return solution_branches.Branches(z, sign)
 
     monkeypatch.setattr("colloc.mechanics.solution_branches.all_balanced_velocities", lost)
     angles, rates = ellipse(0.0, 1.0, 1.0)(np.linspace(0.0, 1.0, 20))
     law = Friction(mu_t=1.0, mu_f=0.01, mu_b=100.0)
     with pytest.raises(NotConvergedError, match="at 1 of 20 time points"):
-        followed_motion(Instants(Chain(), law, angles, rates, 1e-4))
+        solution_branches.followed_motion(Instants(Chain(), law, angles, rates, 1e-4))
 
 
 PRINTED = (np.array([[0.78302927], [1.74481885]]), np.array([[-3.0], [0.0]]))
@@ -224,7 +214,7 @@ def test_links_at_rest_find_at_least_what_hundreds_of_random_starts_find():
         start = 0.5 * rng.normal(size=(3, 60)) * np.exp(rng.normal(size=60))
         solved = solve_balance(body, friction, angles, rates, 1e-4, start=start, tolerance=1e-12)
         apart = np.nanmin(np.abs(few.z - solved.z).max(axis=1), axis=0)
-        assert (apart < DISTINCT)[solved.converged].all()
+        assert (apart < solution_branches.DISTINCT)[solved.converged].all()
 
 
 def test_numpy_finds_the_same_as_the_compiled_solver():

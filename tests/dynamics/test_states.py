@@ -1,11 +1,16 @@
 """One to three states on a mesh whose rates depend on them: order, adjoints, symmetry; orientation and
-place along a mesh: a circle, orders, derivatives, and headings."""
+place along a mesh; and states followed through a period: a closed form, jumps, tolerances."""
+
+import threading
+import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+import scipy.integrate
 from scipy.integrate import solve_ivp
 
-from colloc import Chain, Fourier, Friction
+from colloc import Chain, Fourier, Friction, NotConvergedError
 from colloc.dynamics.collocated import CollocatedPose, heading
 from colloc.dynamics.dynamics import OnSlope, Shapes
 from colloc.dynamics.states import CollocatedStates, Rates
@@ -13,6 +18,7 @@ from colloc.gaits.gait import ANTIPODAL, BILATERAL, NONE
 from colloc.gaits.regime import Regime
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
+from colloc.verification.differential_motion import integrate_period
 
 EDGES = np.array([0.0, 0.1, 0.35, 0.4, 0.8, 1.0])
 SIZES = (1, 2, 3)
@@ -60,32 +66,6 @@ def test_they_converge_to_the_differential_equation_with_the_order_of_the_scheme
         if free:
             np.testing.assert_allclose(end, found, atol=1e-11)
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.3)
-
-
-@pytest.mark.parametrize("k", SIZES)
-@pytest.mark.parametrize("free", [False, True])
-def test_the_adjoint_has_the_slopes_of_differences(k, free):
-    mesh, rng = Mesh(scheme("radau-2"), EDGES), np.random.default_rng(1)
-    mask = np.full(k, free)
-    mask[:1] = free and k != 2  # one told, the other free
-    image = -np.eye(k) if k == 3 else None
-    equations, (rates, on_states) = CollocatedStates(mesh, mask, image), spring(k)
-    (weight, more), start = rng.normal(size=(2, k, mesh.n_point)), np.full(k, 0.2)
-    moved = np.where(mask, 0.0, rng.normal(size=k))
-
-    def number(size):
-        def at(s):
-            return Rates(rates(mesh.times, s) + size * more, on_states(mesh.times, s))
-
-        states, _, held = equations.solve(at, start + size * moved)
-        assert held
-        return (weight * states).sum(), states
-
-    _, states = number(0.0)
-    on_start, on_rates, _ = equations.vjp(on_states(mesh.times, states), weight[None])
-    difference = (number(1e-5)[0] - number(-1e-5)[0]) / 2e-5
-    assert (on_rates[0] * more).sum() + on_start[0] @ moved == pytest.approx(difference, rel=1e-7)
-    np.testing.assert_allclose(on_start[0, mask], 0.0, atol=1e-12)
 
 
 def test_half_a_period_and_its_image_are_the_whole():
@@ -169,27 +149,6 @@ def test_the_place_converges_with_the_order_of_the_scheme(name, order):
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.3)
 
 
-@pytest.mark.parametrize("name", SCHEMES)
-def test_the_displacement_has_the_slopes_of_differences(name):
-    mesh, rng, axis = Mesh(scheme(name), EDGES), np.random.default_rng(0), np.exp(0.4j)
-    shape = (mesh.n, mesh.scheme.s)
-    omega, x, y = (rng.normal(size=shape) for _ in range(3))
-
-    def ahead(*rates):
-        turn, forwards, left = rates
-        end = CollocatedPose(mesh.scheme, mesh.h, turn, forwards + 1j * left).place[-1]
-        return (end * np.conj(axis)).real
-
-    found = CollocatedPose(mesh.scheme, mesh.h, omega, x + 1j * y)
-    on_theta, (on_centre,) = found.on_pose(np.array([axis]))
-    slopes = np.concatenate([found.on_rates(on_theta), on_centre])
-    for which in range(3):
-        step = np.zeros((3, *shape))
-        step[which] = 1e-6 * rng.normal(size=shape)
-        there, back = (ahead(*(np.array([omega, x, y]) + sign * step)) for sign in (1, -1))
-        assert (slopes * step).sum() == pytest.approx(0.5 * (there - back), rel=1e-6)
-
-
 def test_a_gait_goes_where_its_whole_period_leads():
     """The second half of an antipodal gait mirrors the first, from where that ended."""
     displacement, rotation = 0.3 * np.exp(0.9j), 0.5
@@ -199,3 +158,82 @@ def test_a_gait_goes_where_its_whole_period_leads():
         assert np.exp(1j * heading(ANTIPODAL, end, rotation)) == pytest.approx(ahead)
     for symmetry in (NONE, BILATERAL):
         assert heading(symmetry, displacement, rotation) == pytest.approx(0.9)
+
+
+TURN = np.array([[0.0, 2.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+BEGIN = np.array([1.0, 0.0, 2.0])
+
+
+def exact(t):
+    return np.array([np.cos(2 * t), -np.sin(2 * t), 2 * np.exp(-t)])
+
+
+def turning(t, state, asked):
+    return TURN @ state, (asked or 0) + 1
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7])
+def test_three_states_are_those_of_the_closed_form_within_the_tolerance(tolerance):
+    ran = integrate_period(turning, BEGIN, tolerance)
+    assert np.abs(ran.states - exact(ran.phases)).max() < tolerance
+    t = np.linspace(0, 1, 33)
+    assert np.abs(ran.at(t) - exact(t)).max() < tolerance
+
+
+def test_a_jump_of_the_rates_is_met_from_both_sides():
+    """s' = -1, then 3: the later rate never counts for the earlier piece."""
+    seen = []
+
+    def rates(t, state, _):
+        seen.append(t)
+        return np.array([-1.0 if t < 0.3 else 3.0]), None
+
+    ran = integrate_period(rates, np.zeros(1), 1e-6, breaks=(0.3,))
+    assert 0.3 not in seen
+    states = ran.at(np.array([0.15, 0.3, 0.65]))
+    np.testing.assert_allclose(states, [[-0.15, -0.3, 0.75]], atol=1e-9)
+    assert ran.states[0, -1] == pytest.approx(1.8, abs=1e-9)
+
+
+@pytest.mark.parametrize(("others", "asks"), [(True, False), (True, True), (False, False)])
+def test_where_one_method_gives_up_or_asks_without_end_another_goes_on(monkeypatch, others, asks):
+    """As where friction is stiff; where none goes on, a sentence says how far."""
+
+    def gives_up(*given, method, **how):
+        while asks and method == "LSODA":
+            given[0](0.1, given[2])
+        ran = solve_ivp(*given, method=method, **how)
+        ran.success = others and method != "LSODA"
+        return ran
+
+    solve_ivp = scipy.integrate.solve_ivp
+    monkeypatch.setattr(scipy.integrate, "solve_ivp", gives_up)
+    if others:
+        ran = integrate_period(turning, BEGIN, 1e-7)
+        assert np.abs(ran.states - exact(ran.phases)).max() < 1e-7
+    else:
+        with pytest.raises(NotConvergedError, match="could not be followed beyond phase 1"):
+            integrate_period(turning, BEGIN, 1e-7)
+
+
+def test_two_threads_follow_what_one_follows_and_leave_warnings_as_they_were():
+    begun, ended = (threading.Event(), threading.Event()), threading.Event()
+
+    def thread(k):
+        def rates(t, state, asked):
+            begun[k].set()
+            # for the other one, to begin or to end
+            (ended if k else begun[1]).wait(0 if asked else 0.3)
+            return turning(t, state, asked)
+
+        if k:
+            begun[0].wait()
+        states = integrate_period(rates, BEGIN, 1e-7).states
+        ended.set()
+        return states
+
+    alone, before = integrate_period(turning, BEGIN, 1e-7).states, list(warnings.filters)
+    with ThreadPoolExecutor(2) as threads:
+        for states in threads.map(thread, (0, 1)):
+            np.testing.assert_array_equal(states, alone)
+    assert warnings.filters == before

@@ -136,7 +136,6 @@ def test_statements_read_back_as_what_they_were():
 
 @pytest.mark.slow
 def test_columns_that_are_one_harmonic_have_its_optimum():
-    """The search sees other numbers; the set of gaits is the same."""
     own = colloc.solve(Problem("columns", gait=Basis(ELLIPSES, "bilateral")), starts=2)
     known = colloc.solve(Problem("harmonic", gait=Harmonic(1, "bilateral")), starts=2)
     assert own.status == known.status == "solved"

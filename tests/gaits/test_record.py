@@ -22,7 +22,6 @@ NANOSECONDS = [f"{1_700_000_000_000_000_000 + round(s * 1e9)}" for s in SECONDS]
 
 
 def table(*columns, between=",", comma=False, end="\n", digits=9):
-    """Lines of a file, a column for each argument."""
     lines = []
     for row in zip(*columns, strict=True):
         cells = [cell if isinstance(cell, str) else f"{cell:.{digits}g}" for cell in row]

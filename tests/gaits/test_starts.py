@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Corners, Fourier, Harmonic, Polygon, Problem, ProblemError, ellipse
-from colloc.gaits.starts import (
-    SAFE,
-    checked_member,
-    largest_factor,
-    latin_hypercube,
-    latin_hypercube_gait,
-    to_body,
-    to_class,
-    warm_start,
-)
+from colloc.gaits import starts
+from colloc.gaits.starts import latin_hypercube_gait, to_body, warm_start
 from colloc.mechanics.contact import crossing_depth
 from colloc.search.solve import solve
 
@@ -53,7 +45,7 @@ def test_it_is_said_when_a_guess_crosses_itself_most(width, words):
         Problem("crossed", wave, body, gait=Harmonic(1))
     phase = float(str(refused.value).split("phase ")[1].split(";")[0])
     phases = np.append(phase, np.arange(400) / 400)
-    depth = crossing_depth(body, checked_member(Harmonic(1), wave)[0].angles(phases))
+    depth = crossing_depth(body, starts.checked_member(Harmonic(1), wave)[0].angles(phases))
     assert 0.05 < phase < 0.4
     assert depth[0] == pytest.approx(depth.max(), rel=1e-3)
 
@@ -62,7 +54,6 @@ def test_it_is_said_when_a_guess_crosses_itself_most(width, words):
     ("speed", "limit"), [(1.6, np.pi), (0.1, (0.1, 1.5)), (0.1, ((-0.1, 1.5), 1.5))]
 )
 def test_without_a_guess_a_search_begins_where_the_body_moves_enough(speed, limit):
-    """Larger than usual, and each joint as far as its own limit lets it."""
     asked = {"smallest_shape_speed": speed, "joint_limit": limit}
     problem = Problem("fast", gait=Harmonic(1), **asked)
     assert problem.guess.shape_speed > problem.smallest_shape_speed
@@ -73,17 +64,17 @@ def test_without_a_guess_a_search_begins_where_the_body_moves_enough(speed, limi
     ("shape", "limit", "factor"),
     [
         ([0.0, 0.0], np.pi, np.inf),
-        ([0.5, -0.25], 2.0, SAFE * 4.0),
-        ([0.5, 0.5], np.pi, SAFE * 4 * np.pi / 3),  # the ends meet as a triangle, at 2 pi/3
+        ([0.5, -0.25], 2.0, starts.SAFE * 4.0),
+        ([0.5, 0.5], np.pi, starts.SAFE * 4 * np.pi / 3),  # the ends meet as a triangle, at 2 pi/3
     ],
 )
 def test_shapes_grow_to_the_joint_limit_or_to_where_links_touch(shape, limit, factor):
-    grown = largest_factor(Chain(), limit, np.array(shape)[:, None])
+    grown = starts.largest_factor(Chain(), limit, np.array(shape)[:, None])
     assert grown == pytest.approx(factor, rel=1e-6)
 
 
 def test_a_latin_hypercube_has_a_point_in_every_part_of_a_coordinate_and_depends_on_its_seed():
-    first, second = (latin_hypercube(7, 4, np.random.default_rng(3)) for _ in range(2))
+    first, second = (starts.latin_hypercube(7, 4, np.random.default_rng(3)) for _ in range(2))
     np.testing.assert_array_equal(first, second)
     parts = np.sort(np.floor(7 * first), axis=0)
     np.testing.assert_array_equal(parts, np.repeat(np.arange(7)[:, None], 4, axis=1))
@@ -134,7 +125,7 @@ def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class
         "bilateral": [[0.4, 0.5, 0.45], [-0.4, -0.42, -0.45]],
     }
     small = Corners(np.array(corners[symmetry]), symmetry)
-    laid = to_class(gait_class(3, symmetry), small, THREE)
+    laid = starts.to_class(gait_class(3, symmetry), small, THREE)
     assert laid.length == pytest.approx(0.2 * np.pi, rel=2e-3)
     np.testing.assert_allclose(
         laid.angles(PHASES[:-1]).mean(axis=1), small.angles(PHASES[:-1]).mean(axis=1), atol=1e-3

@@ -52,14 +52,8 @@ def test_on_a_slope_that_part_of_gravity_counts_which_presses(unsolved):
 def test_robots_that_are_one_without_dimensions_are_one_problem():
     """Twice as long, with periods longer by the root; three times as heavy."""
     root = 2**0.5
-    giant = Robot(
-        length=1.24,
-        mass=2.7,
-        period=2.5 * root,
-        max_speed=5 / root,
-        max_torque=(7.2, 6.0),
-        idle_power=12 / root,
-    )
+    motors = {"max_speed": 5 / root, "max_torque": (7.2, 6.0), "idle_power": 12 / root}
+    giant = Robot(length=1.24, mass=2.7, period=2.5 * root, **motors)
     one, other = (Problem("snake", robot=robot).without_robot for robot in (SNAKE, giant))
     names = ("froude", "speed_limit", "torque_limit")
     for name in names:

@@ -14,7 +14,7 @@ from cases import HARD
 
 from colloc import Chain, Friction, Problem, solve_balance
 from colloc.mechanics.balance import instant
-from tests.shared.laws import coulomb
+from tests.shared.mechanics import coulomb
 from tests.shared.stages import program_of
 
 STENCIL = ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12))

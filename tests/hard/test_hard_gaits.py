@@ -7,7 +7,7 @@ import pytest
 from colloc import Chain, Friction, Harmonic, Problem, ellipse, replay
 from colloc.results.solution import CERTIFICATE_FAILED, SOLVED
 from colloc.search.solve import solve
-from tests.shared.laws import coulomb
+from tests.shared.mechanics import coulomb
 
 BODY = Chain()
 BILATERAL = Harmonic(1, "bilateral")

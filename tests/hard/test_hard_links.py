@@ -49,7 +49,6 @@ def graded_quadrature(vs, vn, w, length, delta):
 
 
 def test_moments_normal_force_and_couple_agree_with_graded_quadrature_over_all_regimes():
-    """Velocities over 13 decades with exact zeros, delta down to 1e-12."""
     rng, count = np.random.default_rng(1), 4000
     vs, vn, w = 10 ** rng.uniform(-12, 1, (3, count)) * rng.choice([-1, 1], (3, count))
     length, delta = rng.uniform(0.05, 1, count), 10 ** rng.uniform(-12, 0, count)
@@ -77,18 +76,6 @@ def test_pure_translation_and_near_it(w, delta):
         )
         np.testing.assert_allclose(force.tangential, -LENGTH * vs / root, rtol=1e-14, atol=0)
         np.testing.assert_allclose(force.normal, -2 * LENGTH * vn / root, rtol=1e-14, atol=0)
-
-
-def test_turning_about_an_end_or_the_midpoint():
-    """Exact values for a rigid link that pivots, in the dry limit: force mu, or none, and couples
-    of l/2 and l/4."""
-    w, delta = 2.0, 1e-13
-    pivot_at_end = COULOMB.force(*column(0.0, w * LENGTH / 2, w), LENGTH, delta)
-    np.testing.assert_allclose(pivot_at_end.normal, -LENGTH, rtol=1e-12)
-    np.testing.assert_allclose(pivot_at_end.couple, 0.0, atol=1e-12)
-    pivot_at_middle = COULOMB.force(*column(0.0, 0.0, w), LENGTH, delta)
-    assert pivot_at_middle.normal.item() == 0.0
-    np.testing.assert_allclose(pivot_at_middle.couple, -(LENGTH**2) / 4, rtol=1e-12)
 
 
 def test_forces_never_exceed_their_coefficients_nor_dissipation_its_speed():

@@ -56,7 +56,6 @@ def allowed(body, law, angles, rates, delta):
 
 
 def motion(body, law, angles, rates, delta):
-    """Speed of the centre of mass and power."""
     z = solved(body, law, angles, rates, delta)
     now = instant(body, law, angles, rates, z, delta)
     cx, cy = body.centre_velocity(now.posture, now.velocity)

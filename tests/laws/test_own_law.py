@@ -25,17 +25,16 @@ def test_traits_are_found_from_samples():
     assert weaker.smallest == pytest.approx(1 + np.exp(-1))
 
 
+ROOT = OwnLaw("-vs/sqrt(speed)", "-2*vn*speed**(-0.5)")
+
+
 @pytest.mark.parametrize(
     ("own", "built_in"),
     [
         (COULOMB, Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5)),
         (OwnLaw("-vs", "-2*vn"), colloc.Viscous(normal=2.0, tangential=1.0)),
-        (
-            OwnLaw("-vs/sqrt(speed)", "-2*vn*speed**(-0.5)"),
-            colloc.PowerLaw(0.5, mu_t=2.0, mu_f=1.0),
-        ),
+        (ROOT, colloc.PowerLaw(0.5, mu_t=2.0, mu_f=1.0)),
     ],
-    ids=["Coulomb", "viscous", "power"],
 )
 def test_a_stated_law_moves_a_body_as_the_built_in_one_does(own, built_in):
     rng, body = np.random.default_rng(1), Chain()
@@ -50,7 +49,6 @@ def test_a_stated_law_moves_a_body_as_the_built_in_one_does(own, built_in):
 
 
 def test_a_law_of_ones_own_goes_to_other_processes():
-    """As many starts on several processes need it, also once it has been used."""
     law = OwnLaw("-vs/speed * (1 + exp(-speed))", "-2*vn/speed")
     one, delta = np.array([[0.3]]), np.array([[1e-3]])
     again = pickle.loads(pickle.dumps(law))
@@ -176,7 +174,6 @@ def test_metres_and_seconds_are_the_same_law():
 
 @pytest.mark.slow
 def test_it_is_a_law_like_any_other(tmp_path):
-    """NumPy, CasADi, certificate and file, from a file of samples."""
     path = tmp_path / "floor.csv"
     values = table(stribeck(0.7, -0.2, 0.5), stribeck(1.4, -0.4, 0.5))
     header = {"header": "speed,sideways,forward", "comments": ""}

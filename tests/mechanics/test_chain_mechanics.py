@@ -3,8 +3,6 @@
 import casadi as ca
 import numpy as np
 import pytest
-from shared.instants import random_instants, random_loads
-from shared.points import wrench
 
 import colloc
 from colloc import Axle, Chain, Elliptic, Foot, Friction, OwnLaw, Pad, Viscous, Wheel, solve_balance
@@ -13,7 +11,7 @@ from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import chain_motion, motion_and_derivatives
 from colloc.mechanics.native_kernel import native_kernel
 from colloc.results.motion import friction_arrows
-from tests.shared.without_kernel import numpy_instead
+from tests.shared.mechanics import numpy_instead, random_instants, random_loads, wrench
 
 LENGTHS, SKEW = (0.3, 0.45, 0.25), Friction(mu_t=0.5, mu_f=1, mu_b=2)
 ELLIPTIC, AXLE = Elliptic(mu_t=2, mu_f=1, mu_b=1.5), Axle(rolling=0.3, sideways=1.5)
@@ -53,13 +51,6 @@ def rows(motion):
     return np.vstack([motion.z, motion.centre, motion.power])
 
 
-@each_dry_law
-def test_the_extremes_of_a_law_are_those_of_the_force_on_a_foot_that_slides_anywhere(law):
-    turns = np.arange(3600) * np.pi / 1800
-    force = np.hypot(*law.density(*np.round([np.cos(turns), np.sin(turns)], 12), 1e-6))
-    assert [force.min(), force.max()] == pytest.approx([law.smallest, law.largest], rel=1e-5)
-
-
 @each_body
 @each_law
 def test_friction_is_the_sum_over_the_points_that_touch(law, body):
@@ -83,7 +74,6 @@ def test_friction_is_the_sum_over_the_points_that_touch(law, body):
 def test_in_balance_no_force_is_left_and_joints_do_the_work_of_friction_less_the_load_s(
     law, body, size
 ):
-    """Friction alone is held to 1e-9, sums over points along lines to 1e-5."""
     angles, rates = random_instants(20, n_joint=body.n_joint)
     held = size * body.law(law).smallest
     load, at = held * random_loads(20, 1.0), (body, law, angles, rates, 1e-3)

@@ -3,12 +3,12 @@ of mass; its invariances are in tests/hard/test_properties.py and test_chain_mec
 
 import numpy as np
 import pytest
-from shared.instants import random_instants, random_loads
 
 from benchmarks.zoo import feet_problem
 from colloc import Chain, Friction, NotConvergedError, solve_balance
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.solution_branches import all_balanced_velocities
+from tests.shared.mechanics import random_instants, random_loads
 
 LOPSIDED = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 UNEQUAL = Friction(mu_t=1.7, mu_f=1, mu_b=1.3)

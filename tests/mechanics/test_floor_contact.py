@@ -3,25 +3,12 @@ axles: a solve, and a replay that knows no colloc."""
 
 import numpy as np
 import pytest
-from shared.instants import random_instants
-from shared.points import wrench
 
 import colloc
-from colloc import (
-    Axle,
-    Chain,
-    Foot,
-    Friction,
-    Pad,
-    Problem,
-    ProblemError,
-    Viscous,
-    Wheel,
-    solve_balance,
-)
+from colloc import Axle, Chain, Foot, Friction, Pad, Problem, Viscous, Wheel, solve_balance
 from colloc.mechanics.native_kernel import native_kernel
 from tests.mechanics.test_chain_mechanics import BODIES, LAWS, LENGTHS, each_law
-from tests.shared.without_kernel import numpy_instead
+from tests.shared.mechanics import numpy_instead, random_instants, wrench
 
 AHEAD, BACK = Friction(mu_t=1.0, mu_f=0.2, mu_b=0.9), Friction(mu_t=1.0, mu_f=0.9, mu_b=0.2)
 EQUAL, STILL = Friction(), np.zeros((2, 1))
@@ -156,7 +143,7 @@ def test_a_foot_turned_across_is_its_mirror_image_if_it_slides_alike_both_ways()
     for law in (Friction(mu_t=1.0, mu_f=0.2, mu_b=0.2), AHEAD, None):
         feet = Foot(0, friction=law, angle=np.pi / 2), Foot(1), Foot(2)
         if law is None or not law.reversible:
-            with pytest.raises(ProblemError, match="differ between left and right"):
+            with pytest.raises(colloc.ProblemError, match="differ between left and right"):
                 Chain(feet=feet)
         else:
             assert Chain(feet=feet).feet[0].angle == np.pi / 2

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from shared.instants import random_instants
 
 import colloc
 from colloc import Chain, Friction, Harmonic, Problem, ellipse, evaluate, solve_balance
@@ -11,7 +10,7 @@ from colloc.bounds.sampled import Budget, efficiency_bound
 from colloc.mechanics.inertia import kinetic_energy
 from research.guarantee.guaranteed import certify
 from research.guarantee.potential_range import potential_space
-from tests.shared.laws import coulomb
+from tests.shared.mechanics import coulomb, random_instants
 
 LENGTHS, WEIGHTS = (0.2, 0.5, 0.3), (0.5, 0.2, 0.3)
 MASSES, INERTIAS = (0.6, 0.3, 0.1), (0.004, 0.006, 0.0009)
@@ -38,7 +37,6 @@ def test_a_nearly_weightless_head_neither_holds_nor_moves_the_body():
 def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_themselves_or_turn_about_an_end(
     mu,
 ):
-    """A straight body that slides along or across; a turn about a link's own end."""
     body, law, straight = Chain(LENGTHS, weights=WEIGHTS), coulomb(*mu), np.zeros((2, 3))
     most = body.contact.largest_forces(law).ravel()
     along, across, couples = np.split(most, 3)

@@ -17,14 +17,12 @@ from colloc.results.motion import lab_outline
 
 
 def dark(picture):
-    """Middle and extents of the dark pixels of the left part: the body."""
     rows, columns = np.nonzero(picture[60:, : int(0.68 * picture.shape[1])].max(axis=2) < 80)
     left, right, top, bottom = columns.min(), columns.max(), 60 + rows.min(), 60 + rows.max()
     return 0.5 * (left + right), 0.5 * (top + bottom), right - left, bottom - top
 
 
 def test_every_picture_shows_the_body_where_it_is_then(three_link):
-    """At equal scales in both directions, as large as fits in."""
     drawn, (low, high) = list(pictures(three_link, 2, 3)), frames(three_link, 3).window
     assert len(drawn) == 6
     tall, wide, _ = drawn[0].shape
@@ -75,17 +73,9 @@ def test_a_gait_beside_itself_is_drawn_twice_alike(three_link, tmp_path, capsys)
 def test_robots_side_by_side_are_drawn_in_metres_and_seconds():
     """One of half the length and a quarter of the period, at so slow a pace that both do the
     same."""
-    big, small = (
-        colloc.evaluate(
-            colloc.Problem(
-                "robot",
-                gait=colloc.Harmonic(1),
-                robot=colloc.Robot(length=length, mass=1, period=period),
-            ),
-            colloc.ellipse(A0=0, A1=1.5, B1=1.0),
-        )
-        for length, period in ((0.6, 400), (0.3, 100))
-    )
+    robots = (colloc.Robot(length=x, mass=1, period=t) for x, t in ((0.6, 400), (0.3, 100)))
+    stated = (colloc.Problem("robot", gait=colloc.Harmonic(1), robot=robot) for robot in robots)
+    big, small = (colloc.evaluate(each, colloc.ellipse(A0=0, A1=1.5, B1=1.0)) for each in stated)
     drawn = [extents(picture) for picture in pictures(big, 8, 1, arrows=False, beside=small)]
     turned = pictures(small, 8, 1, arrows=False, beside=big)
     np.testing.assert_allclose([extents(picture)[::-1] for picture in turned], drawn, atol=2)

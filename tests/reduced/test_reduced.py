@@ -106,7 +106,6 @@ CASES = cases(CASES, globals())
 
 @pytest.mark.parametrize("case", CASES)
 def test_gradients_are_those_of_differences(case):
-    """Of the objective, of its rows, and of everything that a period adds up."""
     usual = {"guess": ellipse(0.1, 1.6, 1.1), "intervals": 10}
     problem = Problem("p", **(usual | CASES[case]))
     h = 1e-5 if problem.grade else 1e-6
@@ -137,8 +136,6 @@ def test_gradients_are_those_of_differences(case):
     "gait", [Harmonic(1), Harmonic(2, "bilateral"), Polygon(4, "bilateral"), SPLINES]
 )
 def test_the_answer_solves_the_full_program_and_is_the_gait_found(gait):
-    """Tail velocities and link forces among the variables, the balance among the constraints; two
-    programs, one solution."""
     at = {"intervals": 24, "delta": 3e-3, "mesh_tolerance": 0.0}
     problem = Problem("p", ellipse(1.0, 0.7, 1.1), friction=ROUGH, gait=gait, **at)
     answer = answer_near(problem)

@@ -143,7 +143,6 @@ def test_the_peak_of_a_moment_moves_with_the_gait():
 
 
 def test_the_gait_between_two_ways_of_bending_is_a_saddle():
-    """Its curvature is the second difference of the efficiency along its direction."""
     program, v = program_at(PROBLEM, SADDLE)
     found = curvature(program, v)
     assert found.kkt_error < 1e-3

@@ -13,29 +13,19 @@ from colloc.bounds.motions import CoulombMotion, Domain
 from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
 from colloc.bounds.sampled import Bound, Budget, efficiency_bound
 from colloc.mechanics.contact import crossing_depth
-from colloc.mechanics.native_kernel import native_kernel
 from research.guarantee import enclosure, guaranteed
-from research.guarantee.enclosure import (
-    CORNERS,
-    DELTA,
-    Cells,
-    ReferencePoint,
-    by_convexity,
-    by_loads,
-    corner_motions,
-)
+from research.guarantee.enclosure import DELTA, by_convexity, by_loads, corner_motions
 from research.guarantee.guaranteed import Guarantee, cell_bounds, certify, with_guarantee
 from research.guarantee.loaded_balance import loaded_balance
 from research.guarantee.potential_range import PotentialRange, potential_space, turned
 from research.small_gaits import balanced_motion
 from tests.shared.cases import slow
-from tests.shared.without_kernel import numpy_instead
+from tests.shared.mechanics import numpy_instead
 
 BODY, UNIT = Chain(), Friction()
 ALLOWANCES = json.loads(Path(__file__).with_name("allowances.json").read_text(encoding="utf-8"))
 """Gain and power of cells by the inequalities of research/guarantee/README.md, written out a second
 time, with more digits (tests/research of commit 5b26e882)."""
-needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 
 
 @pytest.fixture(scope="module")
@@ -50,8 +40,8 @@ def potential(bound) -> PotentialRange:
 
 def all_cells(low, sizes):
     """Cells that share no corners."""
-    points = (low[:, :, None] + sizes[:, :, None] * CORNERS.T[:, None, :]).reshape(3, -1)
-    return Cells(low, sizes, points, np.arange(points.shape[1]).reshape(-1, 8))
+    points = (low[:, :, None] + sizes[:, :, None] * enclosure.CORNERS.T[:, None, :]).reshape(3, -1)
+    return enclosure.Cells(low, sizes, points, np.arange(points.shape[1]).reshape(-1, 8))
 
 
 def random_cells(body, friction, size, seed, thin=False, count=8):
@@ -66,7 +56,7 @@ def random_cells(body, friction, size, seed, thin=False, count=8):
         low[2] = 10.0 ** rng.uniform(-9, -3, count)
         sizes[2] = low[2] * 3.0
     at, centre = rng.normal(size=(2, 8 * count)), rng.normal(size=(2, count))
-    reference = ReferencePoint(
+    reference = enclosure.ReferencePoint(
         at[0] + 1j * at[1], centre[0] + 1j * centre[1], *rng.uniform(0.1, 1, (3, count))
     )
     cells = all_cells(low, sizes)
@@ -92,7 +82,10 @@ def motions_inside(cells, count, seed, body=BODY, friction=UNIT):
     motions there."""
     shares = np.random.default_rng(seed).uniform(0, 1, (3, cells.low.shape[1], count))
     weights = np.prod(
-        np.where(CORNERS.T[:, None, None, :] == 1, shares[..., None], 1 - shares[..., None]), axis=0
+        np.where(
+            enclosure.CORNERS.T[:, None, None, :] == 1, shares[..., None], 1 - shares[..., None]
+        ),
+        axis=0,
     )
     q1, q2, s = (cells.low[:, :, None] + cells.size[:, :, None] * shares).reshape(3, -1)
     rest, r = np.zeros((3, s.size)), np.stack([np.ones_like(s), s])
@@ -102,7 +95,6 @@ def motions_inside(cells, count, seed, body=BODY, friction=UNIT):
 
 
 @pytest.mark.slow
-@needs_kernel
 def test_loaded_forces_bound_the_power_from_below():
     """Weak duality: admissible forces in balance with a load prove J(z) >= beta.r + load.z for
     every motion z."""
@@ -133,7 +125,6 @@ CASES = pytest.mark.parametrize(
 )
 
 
-@needs_kernel
 @CASES
 @pytest.mark.parametrize("thin", [False, True], ids=["anywhere", "where one joint hardly turns"])
 @pytest.mark.parametrize("size", [slow(0.06), 0.01, slow(0.002)])
@@ -160,7 +151,6 @@ def test_balanced_motions_stay_within_what_is_allowed(potential, body, friction,
         assert np.median(known[np.isfinite(known)]) < 1e-3
 
 
-@needs_kernel
 @pytest.mark.parametrize(
     ("name", "body", "friction", "size", "thin", "seed"),
     [
@@ -189,7 +179,6 @@ def test_allowances_by_convexity_are_the_inequalities_written_out_and_never_less
             assert (1 - 1e-8) * least <= value <= (1 + 1e-5) * least + 1e-12
 
 
-@needs_kernel
 @pytest.mark.parametrize(
     ("name", "friction", "size", "thin", "steps"),
     [
@@ -202,7 +191,6 @@ def test_allowances_by_convexity_are_the_inequalities_written_out_and_never_less
 def test_allowances_by_loads_are_the_inequalities_written_out_cell_by_cell(
     name, friction, size, thin, steps
 ):
-    """Where the solver stopped early too."""
     cells, _, reference = random_cells(ODD_LENGTHS, friction, size, 52, thin)
     rest = np.zeros((3, cells.points.shape[1]))
     corners = loaded_balance(
@@ -215,7 +203,6 @@ def test_allowances_by_loads_are_the_inequalities_written_out_cell_by_cell(
         assert found.power[n] == pytest.approx(power, rel=1e-8, abs=1e-8)
 
 
-@needs_kernel
 @CASES
 @pytest.mark.parametrize("size", [0.06, 0.01])
 def test_cell_bounds_hold_at_random_motions_inside(potential, body, friction, size):
@@ -229,7 +216,6 @@ def test_cell_bounds_hold_at_random_motions_inside(potential, body, friction, si
         assert np.median(value - ratio) < 0.05
 
 
-@needs_kernel
 @pytest.mark.parametrize("way", ["by_convexity", "by_loads"])
 def test_what_a_motion_inside_may_gain_more_and_pay_less_than_at_the_corners_raises_the_bound(
     potential, monkeypatch, way
@@ -258,10 +244,8 @@ def test_what_a_motion_inside_may_gain_more_and_pay_less_than_at_the_corners_rai
     assert (bound_with(0.0, 0.5 * (power.min(axis=1) + power.max(axis=1))) == np.inf).all()
 
 
-@needs_kernel
 @pytest.mark.parametrize("steps", [0, 1, 3])
 def test_cell_bounds_hold_for_whatever_the_solver_returns(potential, monkeypatch, steps):
-    """Far from balance the corners prove less, but nothing false."""
     cells = boxes(potential, 0.01, 200, 38)
     _, rates, angles, true = motions_inside(cells, 10, 39)
     motion = CoulombMotion(angles, rates, true.velocity[:2], true.velocity[2], true.potential)
@@ -272,7 +256,6 @@ def test_cell_bounds_hold_for_whatever_the_solver_returns(potential, monkeypatch
     assert np.all(ratio <= cell_bounds(BODY, UNIT, potential, cells, 0.0))
 
 
-@needs_kernel
 def test_a_cell_whose_bound_is_not_a_number_stays_open(bound, potential, monkeypatch):
     cells = boxes(potential, 0.01, 50, 40)
 
@@ -296,7 +279,6 @@ def stated(bound, friction=UNIT):
     return domain, potential_space(bound, BODY), np.array(bound.coefficients)
 
 
-@needs_kernel
 @pytest.mark.slow
 def test_no_gait_of_the_isotropic_body_reaches_nine_tenths(bound):
     certificate = certify(*stated(bound), 0.9, seconds=100.0)
@@ -352,7 +334,6 @@ def test_parts_share_the_cells_and_these_fill_the_domain(body, monkeypatch):
             assert held[~free].mean() < 0.4, "boxes well inside the crossing are left out"
 
 
-@needs_kernel
 @pytest.mark.parametrize("friction", [UNIT, DIRECTED], ids=["equal", "directed"])
 def test_a_potential_says_the_same_of_a_body_turned_end_for_end(friction):
     """Time runs backwards then, so that every link slides in the same sense along itself."""
@@ -404,7 +385,6 @@ def test_without_a_compiler_it_says_what_is_wanting(potential):
         cell_bounds(BODY, UNIT, potential, cells, 0.5)
 
 
-@needs_kernel
 @pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])
 def test_finite_delta_costs_at_most_delta_in_dissipation_and_in_power(delta):
     """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their
@@ -449,7 +429,6 @@ by_convexity(Chain(), Friction(), cells, corner_motions(Chain(), Friction(), cel
 """
 
 
-@needs_kernel
 @pytest.mark.slow
 def test_it_reads_and_writes_nothing_beyond_its_arrays():
     stays_within_its_arrays(WITHIN_ITS_ARRAYS)

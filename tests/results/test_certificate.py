@@ -15,7 +15,7 @@ from colloc.results.checks import extrapolated_limit
 from colloc.search import certify as verify
 from colloc.search.certify import certify, gait_certificate
 from colloc.verification import replay as replay_module
-from tests.shared.cases import slow_but
+from tests.shared.cases import slow, slow_but
 
 JUST_BELOW, JUST_ABOVE = 0.95, 1.05
 
@@ -78,7 +78,6 @@ def test_first_order_conditions(failures, three_link, name, field, limit):
 
 
 def test_balance_at_the_nodes(failures, three_link):
-    """A tail velocity that is off: the force left over is linear in it."""
     index = three_link.answer.layout.spins[0, 10]
 
     def off(step):
@@ -118,7 +117,6 @@ def test_collocated_against_replayed_efficiency(failures, three_link, replays, s
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("joint", [0, 1])
 def test_closure(failures, three_link, monkeypatch, joint, sign):
-    """One joint that does not come back is enough, to whichever side it drifts."""
     path, astray = Fourier.__call__, sign * np.eye(2)[:, [joint]]
 
     def run(f):
@@ -212,9 +210,7 @@ def test_the_replay_is_as_accurate_as_was_asked_for(three_link, tmp_path, capsys
     assert "NOT VERIFIED" in capsys.readouterr().out
 
 
-LONG = [
-    pytest.param(name, marks=pytest.mark.slow) for name in ("small_gaits", "four_link", "five_link")
-]
+LONG = map(slow, ("small_gaits", "four_link", "five_link"))
 
 
 @pytest.mark.parametrize("name", ["two_link", "three_link", *LONG])
@@ -229,7 +225,6 @@ def test_errors_of_a_certificate_hold(solved, name):
 
 
 def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly():
-    """And wrong by no more than its values."""
     linear = [0.25 + 3.0 * delta for delta in (1e-2, 1e-3, 1e-4)]
     found = extrapolated_limit(linear, [0.0, 0.0, 0.0])
     assert found.value == pytest.approx(0.25, abs=1e-15)

@@ -33,7 +33,6 @@ def numbers(text):
 
 
 def test_an_mjcf_has_the_ranges_feet_and_first_pose_of_the_robot(uneven):
-    """Links and masses are those of its energy."""
     root = ElementTree.fromstring(mjcf(uneven.robot(**SIZE)))
     ranges = [numbers(joint.get("range")) for joint in root.iter("joint") if joint.get("range")]
     assert ranges == [[-1.0, 2.0], [-1.5, 1.5]]
@@ -70,7 +69,6 @@ def links_of_urdf(root):
 
 @pytest.mark.parametrize(("write", "links"), [(mjcf, links_of_mjcf), (urdf, links_of_urdf)])
 def test_a_model_has_the_energy_and_the_centre_of_mass_of_the_robot(write, links, uneven):
-    """So it has its masses, lengths and moments of inertia, each at its place."""
     body, size, rng = uneven.problem.body, SIZE["length"], np.random.default_rng(0)
     angles, rates, z = (rng.normal(size=(n, 1)) for n in (2, 2, 3))
     root = ElementTree.fromstring(write(uneven.robot(**SIZE)))

@@ -57,12 +57,8 @@ def swing(gait):
 
 @pytest.mark.parametrize(
     ("body", "symmetry"),
-    [
-        pytest.param(Chain(FOUR), "none", id="all gaits met shrink"),
-        slow(
-            (Chain(FOUR, feet=1), "bilateral"), id="one does not, and is not the best of its size"
-        ),
-    ],
+    [(Chain(FOUR), "none"), slow((Chain(FOUR, feet=1), "bilateral"))],
+    ids=["all gaits met shrink", "one does not, and is not the best of its size"],
 )
 def test_where_gaits_shrink_the_search_goes_on_among_those_that_a_person_sees_move(body, symmetry):
     gait, coarsely = Harmonic(2, symmetry), {"delta": 1e-3, "intervals": 12}
@@ -96,15 +92,14 @@ def test_four_links_whose_twitch_is_best_get_a_gait_that_one_sees_and_that_is_as
     assert f"{met.starts} converged to it" in solution.standing[0]
 
 
+GIVEN = {"starts": (4, 8, 16, 32), "intervals": (20, 150), "delta_start": (0.03, 1.0)}
+GIVEN |= {"scheme": ["gauss-5"], "formulation": ["implicit velocity"], "mesh_tolerance": [1e-6]}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "given",
-    [
-        *({"starts": starts} for starts in (4, 8, 16, 32)),
-        *({"intervals": intervals} for intervals in (20, 150)),
-        *({"delta_start": delta} for delta in (0.03, 1.0)),
-        *({"scheme": "gauss-5"}, {"formulation": "implicit velocity"}, {"mesh_tolerance": 1e-6}),
-    ],
+    [{name: value} for name, values in GIVEN.items() for value in values],
     ids=str,
 )
 def test_the_answer_does_not_depend_on_what_the_search_is_given(given):

@@ -5,8 +5,6 @@ import json
 
 import numpy as np
 import pytest
-from scipy.optimize import root
-from shared.instants import random_instants
 
 import colloc
 from colloc import Chain, Elliptic, Foot, Fourier, Friction, Polygon, Problem, ProblemError, Wheel
@@ -18,6 +16,7 @@ from colloc.pictures.movie import frames
 from colloc.results.motion import friction_arrows
 from colloc.verification.replay import replay
 from research.small_gaits import small_gait
+from tests.shared.mechanics import random_instants
 
 KNOWN = Fourier([-1.287, 1.287], [[0.687], [-0.687]], [[1.206], [1.206]])
 """A gait of three links on a foot each that a program of its own has found, whose efficiency there
@@ -37,49 +36,6 @@ def test_three_links_on_a_foot_each_go_three_times_as_far_for_their_work_as_on_a
     assert abs(on_feet.certificate.efficiency_at_zero_delta - on_feet.certificate.efficiency) < 1e-3
     # the feet press beneath the centre of mass in every shape
     assert "statics" not in [check.name for check in on_feet.certificate.checks]
-
-
-def played(gait, feet, delta, count=300):
-    """Distance over work of three equal links of equal friction by a program of its own: feet as
-    complex numbers in the frame of the tail, the balance by SciPy, the path by the midpoint
-    rule."""
-    angles, rates = gait((np.arange(count) + 0.5) / count)
-    places = (np.arange(feet) + 0.5) / feet
-    z, heading, way, work = np.zeros(3), 0.0, 0.0, 0.0
-    for q, r in zip(angles.T, rates.T, strict=True):
-        step = np.exp(1j * np.cumsum([0.0, *q])) / 3
-        turn = np.cumsum([0.0, *r])
-
-        def motion(z, step=step, turn=turn):
-            w = 1j * (z[2] + turn) * step
-            ends = (
-                origin + np.concatenate([[0.0], np.cumsum(a)[:-1]])
-                for origin, a in ((0.0, step), (z[0] + 1j * z[1], w))
-            )
-            at, velocity = (
-                end + np.outer(places, along) for end, along in zip(ends, (step, w), strict=True)
-            )
-            return at, velocity, -velocity / np.sqrt(abs(velocity) ** 2 + delta**2) / (3 * feet)
-
-        def balance(z, motion=motion):
-            at, _, force = motion(z)
-            return np.array([force.sum().real, force.sum().imag, (at.conj() * force).imag.sum()])
-
-        starts = z, [0, 0, -turn[1]], [0, 0, -turn[2]], [0, 0, 0], [0, 1, -turn[1]]
-        tries = (root(balance, start, tol=1e-12) for start in starts)
-        z = next(found.x for found in tries if np.abs(found.fun).max() < 1e-10)
-        _, velocity, force = motion(z)
-        middle = heading + 0.5 * z[2] / count
-        way += velocity.mean() * np.exp(1j * middle) / count
-        work -= (force * velocity.conj()).real.sum() / count
-        heading += z[2] / count
-    return abs(way) / work
-
-
-@pytest.mark.parametrize(("gait", "feet"), [(KNOWN, 1), (PAPER, 1), (PAPER, 2), (PAPER, 4)])
-def test_a_replay_is_that_of_a_program_of_its_own(gait, feet):
-    found = replay(Chain(feet=feet), Friction(), gait, 1e-1)
-    assert found.efficiency == pytest.approx(played(gait, feet, 1e-1), rel=2e-3)
 
 
 def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():

@@ -56,7 +56,6 @@ def recorded(
 
 @pytest.mark.slow
 def test_known_coefficients_lie_within_the_errors_nineteen_times_in_twenty(crawled, tmp_path):
-    """Noise of places that lasts tells less."""
     off = []
     for seed in range(12):
         lasts = 1 + 4 * (seed % 2)

@@ -14,17 +14,11 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def stays_within_its_arrays(code):
     """Run Python that has its C compiled with the sanitizer, in a process of its own."""
-    found = subprocess.run(
-        [c_compiler(), "-print-file-name=libasan.so"], capture_output=True, text=True
-    ).stdout.strip()
-    if not os.path.isabs(found):
+    quiet = {"capture_output": True, "text": True}
+    asked = [c_compiler(), "-print-file-name=libasan.so"]
+    library = subprocess.run(asked, **quiet).stdout.strip()
+    if not os.path.isabs(library):
         pytest.skip("the compiler has no address sanitizer")
-    own = {"LD_PRELOAD": found, "ASAN_OPTIONS": "detect_leaks=0"}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, **own},
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-    )
+    environment = {**os.environ, "LD_PRELOAD": library, "ASAN_OPTIONS": "detect_leaks=0"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, cwd=ROOT, **quiet)
     assert done.returncode == 0, done.stderr[-2000:]

@@ -24,23 +24,8 @@ def problem(x=1.0):
 
 
 def outcome(start, efficiency=0.2):
-    return Outcome(
-        start,
-        "solved",
-        "",
-        GAIT,
-        GAIT,
-        efficiency,
-        1e-7,
-        0.1,
-        0.5,
-        1e-4,
-        12,
-        1.5,
-        1.25,
-        efficiency,
-        1e-7,
-    )
+    numbers = 1e-7, 0.1, 0.5, 1e-4, 12, 1.5, 1.25, efficiency, 1e-7
+    return Outcome(start, "solved", "", GAIT, GAIT, efficiency, *numbers)
 
 
 def archive(path, starts=range(3)) -> Archive:

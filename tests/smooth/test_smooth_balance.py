@@ -8,24 +8,12 @@ from scipy.integrate import cumulative_trapezoid
 import colloc
 from colloc import Chain, Concertina, CrawlerBody, Friction, ModalBody, Viscous, Wave
 from colloc.mechanics.fixed_point import motion_and_derivatives, solve_balance
-from colloc.mechanics.friction import line_integrals
 from colloc.results.motion import friction_arrows
-from colloc.smooth.balance import Motion, PanelGrid, curve, node_velocity, resultant, solve_smooth
+from colloc.smooth.balance import Motion, PanelGrid, curve, node_velocity, solve_smooth
 from colloc.smooth.crawler_body import LAP
 from tests.shared.cases import slow
 
 ANISOTROPIC = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
-
-
-@pytest.mark.parametrize("reference", [0, 3, 5])
-def test_path_integrals_are_exact_for_polynomials(reference):
-    edges = np.array([0.0, 0.1, 0.35, 0.4, 0.8, 1.0])[:, None]
-    panels = PanelGrid(edges, order=5)
-    s, origin = panels.nodes, edges[reference, 0]
-    got = panels.integrate(panels.widths * 5 * s**4, reference)
-    np.testing.assert_allclose(got, s**5 - origin**5, atol=2e-15)
-    ends = panels.to_edges(panels.widths * 5 * s**4, reference)
-    np.testing.assert_allclose(ends, edges**5 - origin**5, atol=2e-15)
 
 
 @pytest.mark.parametrize("reference", [0, 2, 4])
@@ -41,17 +29,6 @@ def test_a_stretch_that_rests_is_exactly_at_rest(reference):
     assert np.all(vs[s < 0.5] == 0.0)
     assert np.all(vn[s < 0.5] == 0.0)
     assert np.abs(vn[s > 0.5]).max() > 1e-3
-
-
-def test_straight_rotating_body_agrees_with_the_closed_form_of_a_link():
-    panels = PanelGrid(np.linspace(0, 1, 41)[:, None], order=10)
-    zero = np.zeros_like(panels.nodes)
-    body = curve(panels, zero, zero, 20, np.zeros((1, 1)))
-    z = np.array([[0.3], [0.2], [-1.1]])
-    vs, vn = node_velocity(body, z)
-    got = resultant(body, *ANISOTROPIC.density(vs, vn, 0.05))
-    link = line_integrals(ANISOTROPIC).force(z[:1], z[1:2], z[2:], np.ones((1, 1)), 0.05)
-    np.testing.assert_allclose(got, np.concatenate(link), atol=1e-13)
 
 
 @pytest.mark.parametrize(

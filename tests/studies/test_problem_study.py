@@ -17,7 +17,6 @@ from shared.store_samples import load_study
 
 import colloc
 from colloc import Axis, Chain, Fourier, Friction, Harmonic, Problem, ProblemError, Study, ellipse
-from colloc.commands.families import sweep as main
 from colloc.commands.families import sweep as sweep_study
 from colloc.commands.families import sweep_summary
 from colloc.commands.main import main as colloc_main
@@ -29,29 +28,9 @@ from colloc.results.comparison import reversed_in_time, swap_ends
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import cell as study_cell
 from colloc.studies import sweep as study_run
-from colloc.studies.cell import (
-    GUESS,
-    RESCUE,
-    WARM,
-    Visit,
-    Work,
-    append_visits,
-    best_attempt,
-    read_journal,
-    start_key,
-    value_of,
-)
+from colloc.studies.cell import GUESS, WARM, read_journal, start_key, value_of
 from colloc.studies.study import read_study_file
-from colloc.studies.sweep import (
-    NO_PROBLEM,
-    StudyRun,
-    class_name,
-    gait_class,
-    save_study,
-    study_table,
-    wave_direction,
-    winding,
-)
+from colloc.studies.sweep import StudyRun, gait_class, save_study, study_table
 from colloc.system.task_pool import Lost
 from colloc.verification.replay import replay
 
@@ -79,23 +58,8 @@ def grid(**changes):
 
 
 def outcome(start, guess, gait, efficiency, status=SOLVED):
-    return Outcome(
-        start,
-        status,
-        "",
-        guess,
-        gait,
-        efficiency,
-        1e-7,
-        0.1,
-        0.5,
-        1e-4,
-        3,
-        0.1,
-        0.1,
-        efficiency,
-        1e-7,
-    )
+    numbers = 1e-7, 0.1, 0.5, 1e-4, 3, 0.1, 0.1, efficiency, 1e-7
+    return Outcome(start, status, "", guess, gait, efficiency, *numbers)
 
 
 def landscape(stated, start_from, start, time_limit, **_):
@@ -251,7 +215,7 @@ def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_
     monkeypatch.setattr(study_cell, "run_guess", stubborn)
     run = StudyRun(grid(cold_starts=0), tmp_path)
     finished(run)
-    assert {a.origin for a in run.cells[1, 1].attempts} == {GUESS, WARM, RESCUE}
+    assert {a.origin for a in run.cells[1, 1].attempts} == {GUESS, WARM, study_cell.RESCUE}
     whole = study_table(run)
     table = whole.variables
     assert np.argwhere(table["below_neighbour"]).tolist() == [[1, 1]]
@@ -317,7 +281,7 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
     run = StudyRun(grid(problem=stated), tmp_path)
     finished(run)
     table = study_table(run).variables
-    assert set(table["status"][1]) == {NO_PROBLEM}
+    assert set(table["status"][1]) == {study_run.NO_PROBLEM}
     said = r"x = 2.0, y = 1.0: .*study.py, line \d+: ZeroDivisionError: not here"
     assert re.search(said, table["message"][1, 0])
     assert set(table["status"][0]) == {"error"}
@@ -332,12 +296,13 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
 def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_gait_of_all_its_starts():
     start, elsewhere = ellipse(0.0, 2.0, 1.0), ellipse(0.0, 2.85, 1.3)
     stated = Problem("two", start, gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=12)
-    work = Work((0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 300.0, 1)
+    at = (0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 300.0, 1
+    work = study_cell.Work(*at)
     done = study_cell.visit(work)
     assert [a.outcome.status for a in done.attempts if a.origin == WARM] == [SOLVED]
     passed = [a for a in done.attempts if a.outcome.status == PASSED_OVER]
     assert GUESS in {a.origin for a in passed}
-    best = best_attempt(done.attempts).outcome.value
+    best = study_cell.best_attempt(done.attempts).outcome.value
     alone = [study_cell.run_guess(stated, lambda a=a: a.outcome.guess, 0, 300.0) for a in passed]
     assert {end.status for end in alone} == {SOLVED}
     assert max(end.value for end in alone) <= best * (1 + study_cell.BETTER)
@@ -352,7 +317,8 @@ def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_g
 
 
 def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
-    append_visits(tmp_path, [Visit("a", (), {"known": 0.2, "unknown": np.nan, "endless": np.inf})])
+    scores = {"known": 0.2, "unknown": np.nan, "endless": np.inf}
+    study_cell.append_visits(tmp_path, [study_cell.Visit("a", (), scores)])
     (kept,) = read_journal(tmp_path)
     assert kept.scores == {"known": 0.2}
 
@@ -456,9 +422,12 @@ def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
     both = Fourier([0.8, -0.5], [[1.0, 0.5], [0.0, 0.0]], [[0.0, 0.0], [1.0, -0.5]])
     twice = Fourier([0.8, -0.5], [[0.0, 0.5], [0.0, 0.0]], [[0.0, 0.0], [0.0, -0.5]])
     for gait, turns, wave in ((quarter, 1, 1), (back, -1, -1), (both, 1, 1 / 3), (twice, -2, -1)):
-        assert (winding(gait), wave_direction(gait)) == (turns, pytest.approx(wave))
+        assert (study_run.winding(gait), study_run.wave_direction(gait)) == (
+            turns,
+            pytest.approx(wave),
+        )
     together = Fourier([0, 0], [[1.0], [1.0]], [[0.0], [0.0]])
-    assert wave_direction(together) == pytest.approx(0.0)
+    assert study_run.wave_direction(together) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
@@ -488,13 +457,10 @@ def test_what_is_off_by_a_hundredth_of_a_gait_still_counts_as_symmetric(size):
 
 
 def test_a_gait_is_standing_if_it_goes_back_its_way_or_hardly_has_a_wave_or_hardly_moves_along_itself():
-    assert class_name(False, False, True, 1, 1) == "standing (retraced), none"
-    for wave, forward, kind in (
-        (0.04, 1, "standing"),
-        (0.5, 0.04, "standing"),
-        (-0.5, -0.3, "direct"),
-    ):
-        assert class_name(False, False, False, wave, forward) == f"{kind}, none"
+    assert study_run.class_name(False, False, True, 1, 1) == "standing (retraced), none"
+    named = (0.04, 1, "standing"), (0.5, 0.04, "standing"), (-0.5, -0.3, "direct")
+    for wave, forward, kind in named:
+        assert study_run.class_name(False, False, False, wave, forward) == f"{kind}, none"
 
 
 @pytest.mark.parametrize(("mu_t", "kind"), [(20.0, "retrograde, both"), (0.1, "direct, both")])
@@ -565,15 +531,6 @@ STUDY = Study("modes", (Axis("mu_t", (100.0, 50.0)),), problem, cold_starts=0, w
 """
 
 
-@pytest.mark.slow
-def test_gaits_of_modes_travel_between_neighbours_and_are_kept(tmp_path, capsys):
-    (tmp_path / "study.py").write_text(STUDY)
-    assert main([str(tmp_path / "study.py"), "--output", str(tmp_path), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
-    best = load_study(tmp_path / "modes.nc").variables["efficiency"]
-    assert float(best[0]) > float(best[1]) > 0.3  # more friction sideways helps
-
-
 PRESCRIBED = """
 from colloc import Axis, Friction, Problem, Study, Wave
 
@@ -586,14 +543,18 @@ STUDY = Study("waves", (Axis("mu_t", (100.0, 50.0)),), problem)
 
 
 @pytest.mark.slow
-def test_a_sweep_of_prescribed_motions_measures_each_once(tmp_path, capsys):
-    """Nothing travels between neighbours and nothing is sampled where nothing is free."""
-    (tmp_path / "study.py").write_text(PRESCRIBED)
-    assert main([str(tmp_path / "study.py"), "--output", str(tmp_path), "--json"]) == 0
+@pytest.mark.parametrize(("text", "least"), [(STUDY, 0.3), (PRESCRIBED, 0.5)])
+def test_gaits_of_modes_travel_between_neighbours_and_prescribed_motions_are_measured_once(
+    text, least, tmp_path, capsys
+):
+    (tmp_path / "study.py").write_text(text)
+    assert sweep_study([str(tmp_path / "study.py"), "--output", str(tmp_path), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}
-    study = load_study(tmp_path / "waves.nc").variables
-    assert study["efficiency"][0] > study["efficiency"][1] > 0.5
-    assert study["starts"].tolist() == [1, 1]
+    (file,) = tmp_path.glob("*.nc")
+    study = load_study(file).variables
+    assert study["efficiency"][0] > study["efficiency"][1] > least  # friction sideways helps
+    if text == PRESCRIBED:
+        assert study["starts"].tolist() == [1, 1]
 
 
 @pytest.mark.parametrize("command", ["multistart", "pareto"])

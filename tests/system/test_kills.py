@@ -97,17 +97,14 @@ def child(kind, folder, pipe):
 
 
 def solve_facts(solution, path):
-    """What a file of one solve holds."""
     return {"result": solution.answer.x.sum()}
 
 
 def start_facts(outcomes):
-    """What an archive holds: the gait of each start."""
     return {str(name): outcome.gait.cos.sum() for name, outcome in outcomes.items()}
 
 
 def attempt_facts(records):
-    """What the journal of a study holds: the gait of each attempt at each problem."""
     return {
         f"{r.problem_hash} {a.key}": a.outcome.gait.cos.sum() for r in records for a in r.attempts
     }

@@ -12,13 +12,7 @@ import colloc
 from colloc import Chain, Elliptic, Foot, Friction, ellipse, replay
 from colloc.commands.results import verify as main
 from colloc.verification import dry_friction as module
-from colloc.verification.dry_friction import (
-    Between,
-    DryBalance,
-    DryFriction,
-    dry_balance,
-    dry_friction,
-)
+from colloc.verification.dry_friction import dry_balance, dry_friction
 
 ISOTROPIC, ELLIPTIC = Friction(), Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0)
 UNEVEN = Chain(
@@ -179,7 +173,7 @@ def interval(monkeypatch):
             n = angles.shape[1]
             z = body.solve(body.law(law), angles, rates, DELTA).z
             power = body.sliding(body.law(law), angles, rates, z, np.full((1, n), DELTA)).power[0]
-            found = DryBalance(power, power, z, np.zeros_like(z))
+            found = module.DryBalance(power, power, z, np.zeros_like(z))
             return found._replace(**{name: getattr(found, name) + added(n)}) if name else found
 
         monkeypatch.setattr(module, "dry_balance", known)
@@ -245,5 +239,5 @@ def test_power_that_may_be_less_or_more_moves_that_end_of_the_work_alone(interva
 
 
 def test_efficiency_lies_between_the_least_way_for_the_most_work_and_the_most_for_the_least():
-    found = DryFriction(Between(0.2, 0.3), Between(1.0, 2.0), 0.0, 10)
+    found = module.DryFriction(module.Between(0.2, 0.3), module.Between(1.0, 2.0), 0.0, 10)
     assert found.efficiency == (0.1, 0.3)

@@ -27,7 +27,6 @@ FIXED = [entry for entry in RECORDED if entry["row"] is not None][:4]
 
 
 def test_the_other_program_has_the_forces_of_the_integral_table_in_sixty_digits():
-    """Also at links that hardly turn, and nearly at rest."""
     body, rng = Crawler((0.2, 0.5, 0.3), (1.7, 1.0, 1.3)), np.random.default_rng(1)
     cases = (1.0, 1.0, 1e-2), (1e-6, 1.0, 1e-4), (1.0, 1e-4, 1e-6), (1e-3, 1e-3, 1e-4)
     for spin, speed, delta in cases:
@@ -42,7 +41,6 @@ def test_the_other_program_has_the_forces_of_the_integral_table_in_sixty_digits(
 
 
 def test_the_other_program_knows_the_best_ellipse_of_the_paper():
-    """Efficiency 0.26, without rotation."""
     best = ellipse(0.0, 2.8593, 1.3015)
     done = played(Crawler((1 / 3,) * 3, (1.0, 1.0, 1.0)), best, 1e-2, 1e-3, panels=20)
     assert done.efficiency == pytest.approx(0.26, abs=1e-3)
@@ -68,19 +66,10 @@ def test_what_is_recorded_is_what_the_other_program_finds(number):
 LEANING = Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 
 
-@pytest.mark.parametrize(
-    ("play", "seed", "number"),
-    slow_but(
-        [("motion", 2, 6), ("slope", 1, 45)],
-        [
-            ("motion", 1, 17),
-            ("motion", 2, 6),
-            ("motion", 2, 18),
-            ("slope", 1, 45),
-            ("slope", 1, 57),
-        ],
-    ),
-)
+ONCE = [("motion", 2, 6), ("slope", 1, 45), ("motion", 1, 17), ("motion", 2, 18), ("slope", 1, 57)]
+
+
+@pytest.mark.parametrize(("play", "seed", "number"), slow_but(ONCE[:2], ONCE))
 def test_distance_work_rotation_and_efficiency_are_as_exact_as_is_said(play, seed, number):
     """Each of these cases was not, once."""
     ran = getattr(stated_errors, play)(stated_errors.random_case(seed, number))

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shared.points import wrench
 
 import colloc
 from colloc.dynamics.slow_enough import SCHEME, efficiency_at
@@ -14,6 +13,7 @@ from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.verification.differential_motion import GaitWithInertia, PeriodicRun
 from tests.shared.inertia import played as with_inertia
+from tests.shared.mechanics import wrench
 
 GAIT = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
@@ -80,7 +80,6 @@ def test_newtons_law_for_dense_points_says_the_same(body, friction, gait):
 
 
 def test_without_friction_momentum_is_conserved():
-    """A free body keeps its velocity and angular momentum, however its joints move."""
     angles, rates = LEANING(np.array([0.3]))
     states = np.array([[0.2], [-0.4], [0.05]])
     law = colloc.Friction(1e-12, 1e-12, 1e-12)
@@ -120,7 +119,6 @@ def test_a_motion_is_stable_where_no_small_change_grows():
 
 @pytest.mark.slow
 def test_slow_motion_is_the_limit():
-    """The difference falls at least like the Froude number."""
     slow = colloc.replay(CHAIN, ISOTROPIC, GAIT, 1e-2, tolerance=1e-7).efficiency
     mesh = Mesh(scheme(SCHEME), np.linspace(0, 1, 401))
     at = CHAIN, ISOTROPIC, GAIT, mesh, 1e-2
@@ -132,7 +130,6 @@ def test_slow_motion_is_the_limit():
 
 @pytest.mark.slow
 def test_corners_are_passed_where_they_are():
-    """Against steps that know nothing of them but are small."""
     gait = colloc.Corners(np.array([[0.0, 1.5, 0.4], [0.0, 0.2, 1.4]]))
     exact = with_inertia(CHAIN, ISOTROPIC, gait, 1e-2, 0.1, breaks=gait.corner_phases)
     blind = with_inertia(CHAIN, ISOTROPIC, gait, 1e-2, 0.1)
@@ -177,7 +174,6 @@ def test_what_inertia_takes_from_a_gait_that_turns_does_not_depend_on_where_its_
 
 @pytest.mark.slow
 def test_a_body_from_rest_moves_as_newtons_law_says():
-    """The first and the second period differ."""
     at = UNEQUAL, ANISOTROPIC, LEANING, 0.05, 0.1
     begun = colloc.motion_from_rest(*at, periods=2)
     expected = [newtons_law(*at, periods=n) for n in (1, 2)]

@@ -16,13 +16,7 @@ from colloc.numerics.schemes import scheme
 from colloc.search import optimise as refine
 from colloc.verification import mesh_error as refinement
 from colloc.verification.adaptive_motion import fine_motion, rates_at
-from colloc.verification.mesh_error import (
-    constraint_violation,
-    gait_motion,
-    kink_phases,
-    mesh_error,
-    plan_mesh,
-)
+from colloc.verification.mesh_error import kink_phases, mesh_error, plan_mesh
 from tests.shared.stages import answer_near
 
 GAIT = ellipse(0, 2.8, 1.25)
@@ -55,7 +49,7 @@ def planned(stated, mesh=None, tolerance=1e-6, **how):
 
 def fine_of(stated, mesh=None, gait=GAIT, tolerance=1e-6):
     control = control_problem(stated)
-    return gait_motion(control, gait, DELTA, mesh or control.mesh(), tolerance)
+    return refinement.gait_motion(control, gait, DELTA, mesh or control.mesh(), tolerance)
 
 
 @each_friction
@@ -252,8 +246,11 @@ def test_violations_are_reported_in_the_interval_where_they_are():
     stated = problem()
     control, wide = control_problem(stated), GAIT.scaled(1.2)
     mesh = control.mesh()
-    assert constraint_violation(control.admissible, mesh, GAIT).max() == 0
-    violation, t = constraint_violation(control.admissible, mesh, wide), np.linspace(0, 0.5, 2001)
+    assert refinement.constraint_violation(control.admissible, mesh, GAIT).max() == 0
+    violation, t = (
+        refinement.constraint_violation(control.admissible, mesh, wide),
+        np.linspace(0, 0.5, 2001),
+    )
     angles = wide.angles(t)
     excess = np.maximum(np.abs(angles).max(axis=0) - np.pi, crossing_depth(stated.body, angles))
     cells = np.unique(np.clip(np.searchsorted(mesh.edges, t[excess > 1e-3]) - 1, 0, mesh.n - 1))

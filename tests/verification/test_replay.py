@@ -21,13 +21,12 @@ from colloc.verification.replay import (
     remaining_error,
 )
 from tests.conftest import ROOT
-from tests.shared.laws import coulomb
+from tests.shared.mechanics import coulomb
 
 LAWS = [(1.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0), (10.0, 1.0, 1.0)]
 
 
 def random_path(seed):
-    """A wave of two harmonics through three to five links, and a law."""
     rng = np.random.default_rng(seed)
     n_joint = int(rng.integers(2, 5))
     waves = rng.normal(0, 0.4, (2, n_joint, 2))
@@ -95,7 +94,6 @@ def test_an_accuracy_beyond_that_of_the_balance_is_not_claimed():
 
 
 def test_another_followed_point_changes_the_distance_by_at_most_rotation_times_lever():
-    """The ends of the body against its centre: first order in the rotation."""
     for seed in range(4):
         body, friction, path = random_path(seed)
         result = replay(body, friction, path, 1e-4, tolerance=1e-4)
@@ -126,7 +124,6 @@ def test_the_error_of_the_efficiency_is_made_of_those_of_distance_and_work():
 
 
 def test_the_best_polygon_that_is_known_is_replayed_at_its_value():
-    """Of three equal links within 2.5 rad, with 1940 corners."""
     file = ROOT / "results/curated/many_corners.json"
     stored = json.loads(file.read_text(encoding="utf-8"))
     gait = Corners(stored["corners"], stored["symmetry"])
@@ -148,7 +145,6 @@ def at_rest(power):
 
 
 def panels_of(power, n=16, corner=None):
-    """With a corner at the end of a panel or none."""
     left, width = np.arange(n) / n, np.full(n, 1 / n)
     t = left[:, None] + width[:, None] * np.linspace(0, 1, 5)
     if corner is not None:

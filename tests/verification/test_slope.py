@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 from scipy.optimize import brentq, root
-from shared.points import wrench
 
 import colloc
 from colloc import Chain, Corners, Foot, Fourier, Friction, Pad, Wheel, replay, slope_motion
 from colloc.gaits.regime import Regime
 from tests.shared.cases import slow
-from tests.shared.laws import coulomb
+from tests.shared.mechanics import coulomb, wrench
 
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
 """A gait without any symmetry."""
@@ -26,7 +25,6 @@ PADS = Chain((0.2, 0.5, 0.3), feet=(Pad(0, 0.5, 1.0), Wheel(1, 0.3), Pad(2, 0.2,
 
 
 def still(t):
-    """A bent body whose joints rest."""
     return np.tile([[0.4], [-0.7]], np.size(t)), np.zeros((2, np.size(t)))
 
 

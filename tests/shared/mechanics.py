@@ -1,11 +1,33 @@
-"""A chain as points that touch the floor, walked through in the lab by complex numbers."""
+"""Random instants of a chain, its laws, and its balance by other means than the kernel."""
+
+from contextlib import contextmanager
+from unittest.mock import patch
 
 import numpy as np
+
+from colloc import Friction
+from colloc.mechanics import native_kernel
+
+
+def coulomb(mu_t, mu_f, mu_b):
+    return Friction(mu_t=mu_t, mu_f=mu_f, mu_b=mu_b)
+
+
+def random_instants(count, seed=0, n_joint=2):
+    """Angles over all of shape space, rates of order 1, each ``(n_joint, count)``."""
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-np.pi, np.pi, (n_joint, count)), rng.normal(size=(n_joint, count))
+
+
+def random_loads(count, size, seed=3):
+    """Forces ``(2, count)`` of one magnitude, in all directions."""
+    angle = np.random.default_rng(seed).uniform(-np.pi, np.pi, count)
+    return size * np.stack([np.cos(angle), np.sin(angle)])
 
 
 def wrench(body, law, angles, rates, z, delta, load=(0.0, 0.0), count=4000):
     """Net force and torque about the tail, power and velocity of the centre of mass at one instant,
-    from `count` points on each line."""
+    from `count` points on each line, walked through in the lab by complex numbers."""
     phi, w = np.cumsum([0.0, *angles]), z[2] + np.cumsum([0.0, *rates])
     step = np.array(body.lengths) * np.exp(1j * phi)
     starts = np.concatenate([[0.0], np.cumsum(step)[:-1]])
@@ -24,3 +46,10 @@ def wrench(body, law, angles, rates, z, delta, load=(0.0, 0.0), count=4000):
         net, torque = net + force.sum(), torque + ((starts[k] + arm).conj() * force).imag.sum()
         power -= (force * velocity.conj()).real.sum()
     return np.array([net.real, net.imag, torque]), power, mass @ speeds
+
+
+@contextmanager
+def numpy_instead():
+    """A context in which NumPy does everything, on all threads."""
+    with patch.object(native_kernel, "library", lambda: None):
+        yield
