@@ -85,6 +85,14 @@ class Contact:
     slopes: Callable[[np.ndarray, np.ndarray], np.ndarray]
     width: float
 
+    @property
+    def kernel_numbers(self) -> np.ndarray:
+        """For the compiled kernel (native/contacts.h)."""
+        kind = 1 + (_crossing_sum, _straddling, _lacking).index(self.function)
+        sides = zip(np.array(self.joints)[self.order], self.numbers, strict=True)
+        head = kind, len(self.joints), self.numbers.shape[1], self.width
+        return np.concatenate([head, *(side for pair in sides for side in pair)])
+
     def pair(self, angles: Array) -> tuple[Array, Array]:
         """Both values ``(1, n_time)``, at all angles of a body."""
         return self._values(angles[list(self.joints), :])

@@ -96,6 +96,7 @@ def library() -> ctypes.CDLL | None:
         return None
     for name in ("colloc_period", "colloc_period_vjp"):  # of as many lanes as the processor has
         setattr(built, name, built[f"{name}_{built.colloc_lanes()}"])
+    built.colloc_shape_functions.argtypes = [_TYPES[each] for each in "inppppnpppp"]
     return with_signatures(built, _SIGNATURES)
 
 

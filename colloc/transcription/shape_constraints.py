@@ -17,14 +17,9 @@ from scipy import sparse
 from colloc.dynamics.control_problem import ControlProblem
 from colloc.gaits.limits import Limit, joint_ranges
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.contact import (
-    Contact,
-    Pairs,
-    held_minimum,
-    share_of_first,
-    smooth_minimum,
-)
+from colloc.mechanics.contact import Pairs, held_minimum, share_of_first
 from colloc.mechanics.densities import JointMap
+from colloc.mechanics.native_kernel import addresses, library
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, peaks, vertex
 from colloc.numerics.repeated import Program
@@ -39,23 +34,7 @@ _HELD_SHARE, _HELD_NEAR = 1e-3, 0.05
 it is this near to its bound [rad]: elsewhere the gait may move far."""
 _STEP, _LARGEST, _STEPS = 1e-3, 0.1, 4
 """Sampling and largest step of Newton's method, as parts of a cell; number of steps."""
-_BLOCK = 4000  # values at once, which stay in the cache
-
-
-class Contacts(NamedTuple):
-    """Contacts of one function, side by side: joints ``(k, 2, n)`` and numbers ``(m, 2, n)`` of
-    both values, after zeros for links that are less far apart."""
-
-    like: Contact
-    joints: np.ndarray
-    numbers: np.ndarray
-
-    def pair(self, which: np.ndarray, angles: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Both values ``(2, n_time)``; angles and numbers that they take."""
-        joints, numbers = self.joints[:, :, which], self.numbers[:, :, which]
-        taken = angles[joints, np.arange(which.size)].reshape(len(joints), -1)
-        numbers = numbers.reshape(len(numbers), -1)
-        return self.like.function(taken, numbers).reshape(2, -1), taken, numbers
+_NONE = np.empty(0)
 
 
 class ShapeChecks:
@@ -87,13 +66,11 @@ class ShapeChecks:
         self.rows = np.zeros((len(self.names), body.n_joint))
         self.rows[: self.n_angle] = 0.0 if self._stretches else bounded.rows
         self.rows[self.n_shape :] = motors[: len(speeds)] / np.reshape(speeds, (-1, 1))
-        self._groups, self._group = list[Contacts](), np.full(len(self.names), -1)
-        self._place = np.zeros(len(self.names), dtype=int)
-        for function in dict.fromkeys(each.function for each in self.contacts):
-            of = [k for k, each in enumerate(self.contacts) if each.function is function]
-            at = self.n_angle + np.array(of)
-            self._group[at], self._place[at] = len(self._groups), np.arange(at.size)
-            self._groups.append(_side_by_side([self.contacts[k] for k in of], body.n_joint))
+        each = [np.array([0.0, *row]) for row in self.rows]  # 0: linear, in native/contacts.h
+        each[self.n_angle : self.n_shape] = [contact.kernel_numbers for contact in self.contacts]
+        first = np.cumsum([0, *(numbers.size for numbers in each)])
+        self._memory = np.concatenate([*each, np.empty(0)]), first
+        self._numbers = addresses(self._memory)
 
     def bounds(self, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
         n_rate = len(self.names) - self.n_shape
@@ -124,14 +101,11 @@ class ShapeChecks:
 
     def shares(self, which: np.ndarray, shapes: np.ndarray) -> np.ndarray:
         """Shares that are held as the gait moves."""
-        shares = self.fresh_shares(which, shapes)
-        for here, group, (first, second), *_ in self._contacts_at(which, shapes):
-            width = group.like.width
-            of_first = share_of_first(first, second, width)
-            near = smooth_minimum(first, second, width) > -_HELD_NEAR
-            both = near & (np.abs(of_first - 0.5) < 0.5 - _HELD_SHARE)
-            shares[here] = np.where(both, of_first, -1.0)
-        return shares
+        fresh = self.fresh_shares(which, shapes)
+        values, of_first, _ = self._evaluate(which, shapes, fresh)
+        both = (values > -_HELD_NEAR) & (np.abs(of_first - 0.5) < 0.5 - _HELD_SHARE)
+        contact = (which >= self.n_angle) & (which < self.n_shape)
+        return np.where(contact & both, of_first, fresh)
 
     def _largest(self, k: int, shapes: np.ndarray) -> np.ndarray:
         """Place of the largest angle on a stretch ``(n,)``, by a parabola."""
@@ -152,47 +126,65 @@ class ShapeChecks:
             rows[on_stretch] = self._stretches[0].angles_at(shares[on_stretch])
         return rows
 
-    def _contacts_at(self, which: np.ndarray, shapes: np.ndarray) -> Any:
-        if (self._group[which] >= 0).any():
-            shapes = np.concatenate([shapes, np.zeros((1, which.size))])
-        for k, group in enumerate(self._groups):
-            here = np.flatnonzero(self._group[which] == k)
-            if here.size:
-                place = self._place[which[here]]
-                yield here, group, *group.pair(place, shapes[:, here]), place
-
     def values(
-        self, which: np.ndarray, shapes: np.ndarray, shares: np.ndarray | None = None
+        self,
+        which: np.ndarray,
+        shapes: np.ndarray,
+        shares: np.ndarray | None = None,
+        column: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Values ``(n,)``, by default with no share held."""
-        shares = self.fresh_shares(which, shapes) if shares is None else shares
-        values = np.einsum("nj,jn->n", self.linear_rows(which, shares), shapes)
-        for here, group, (first, second), *_ in self._contacts_at(which, shapes):
-            values[here] = held_minimum(first, second, shares[here], group.like.width)
-        return values
+        """Values ``(n,)``, by default with no share held, at some columns of the shapes, by default
+        one each."""
+        if shares is None:
+            shares = self.fresh_shares(which, shapes if column is None else shapes[:, column])
+        return self._evaluate(which, shapes, shares, column)[0]
 
     def slopes(self, which: np.ndarray, shapes: np.ndarray, shares: np.ndarray) -> np.ndarray:
         """Derivatives ``(n_joint, n)`` along the shapes."""
-        slopes = np.zeros((len(shapes) + 1, which.size))
-        slopes[:-1] = self.linear_rows(which, shares).T
-        for here, group, (first, second), taken, numbers, place in self._contacts_at(which, shapes):
-            each = group.like.slopes(taken, numbers).reshape(len(taken), 2, -1)
-            share = shares[here]
-            share = np.where(share < 0, share_of_first(first, second, group.like.width), share)
-            for side, weight in enumerate((share, 1.0 - share)):
-                slopes[group.joints[:, side, place], here] += weight * each[:, side]
-        return slopes[:-1]
+        slopes = np.empty((len(shapes), which.size))
+        return self._evaluate(which, shapes, shares, slopes=slopes)[2]
 
+    def _evaluate(
+        self,
+        which: np.ndarray,
+        shapes: np.ndarray,
+        shares: np.ndarray,
+        column: np.ndarray | None = None,
+        slopes: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Values, shares of the first values of contacts, and slopes, if there is room for them."""
+        shares, shapes = shares.copy(), np.ascontiguousarray(shapes)
+        kernel = None if self._stretches else library()
+        if kernel is None:
+            at = shapes if column is None else shapes[:, column]
+            return self._evaluate_by_numpy(which, at, shares)
+        column = np.arange(which.size) if column is None else column
+        where = np.ascontiguousarray(which), column, shapes.shape[1], shapes
+        values = np.empty(which.size)
+        of = len(shapes), which.size, *self._numbers
+        if kernel.colloc_shape_functions(*of, *where, shares, values, slopes):
+            raise MemoryError("no memory for the angles of a body.")
+        return values, shares, slopes if slopes is not None else _NONE
 
-def _side_by_side(contacts: list[Contact], n_joint: int) -> Contacts:
-    """Where angles are missing, that of a joint `n_joint`, which is straight, and no length."""
-    most, joints, numbers = max(len(each.joints) for each in contacts), [], []
-    for each in contacts:
-        n_angle, taken = len(each.joints), np.array(each.joints)[each.order]
-        first = [each.numbers.shape[1] - n_angle] * (most - n_angle)
-        joints.append(np.insert(taken, [0] * len(first), n_joint, axis=1).T)
-        numbers.append(np.insert(each.numbers, first, 0.0, axis=1).T)
-    return Contacts(contacts[0], np.stack(joints, axis=-1), np.stack(numbers, axis=-1))
+    def _evaluate_by_numpy(
+        self, which: np.ndarray, shapes: np.ndarray, shares: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        slopes = self.linear_rows(which, shares).T.copy()
+        values = np.einsum("jn,jn->n", slopes, shapes)
+        for k, contact in enumerate(self.contacts, self.n_angle):
+            here = np.flatnonzero(which == k)
+            first, second = (value[0] for value in contact.pair(shapes[:, here]))
+            values[here] = held_minimum(first, second, shares[here], contact.width)
+            of_first = share_of_first(first, second, contact.width)
+            shares[here] = share = np.where(shares[here] < 0, of_first, shares[here])
+            for weight, order, numbers in zip(
+                (share, 1 - share), contact.order, contact.numbers, strict=True
+            ):
+                joints = np.array(contact.joints)[order, None]
+                slopes[joints, here] += weight * contact.slopes(
+                    shapes[joints, here], numbers[:, None]
+                )
+        return values, shares, slopes
 
 
 shape_checks = lru_cache(maxsize=64)(ShapeChecks)
@@ -205,24 +197,26 @@ def near_peaks(
     worst instants there, ``(n,)`` each."""
     lower, upper = checks.bounds(limit)
 
-    def excess(which: np.ndarray, times: np.ndarray) -> np.ndarray:
-        starts, found = range(0, which.size, _BLOCK), np.empty(which.size)
-        for at in (slice(start, start + _BLOCK) for start in starts):
-            of, shapes = which[at], checks.shapes(gaits, table, which[at], times[at])
-            values = checks.values(of, shapes)
-            found[at] = np.maximum(values - upper[of], lower[of] - values)
-        return found
+    def excess(which: np.ndarray, values: np.ndarray) -> np.ndarray:
+        return np.maximum(values - upper[which], lower[which] - values)
 
     fine, every = np.linspace(0.0, 1.0, SAMPLES + 1), np.arange(len(checks.names))
     times = (mesh.edges[:-1, None] + mesh.h[:, None] * fine).ravel()
-    highest = excess(np.repeat(every, times.size), np.tile(times, every.size))
+    shapes = table @ gaits.functions(times) + gaits.offset(len(table))
+    if checks.n_shape < every.size:
+        shapes = np.concatenate([shapes, table @ gaits.functions(times, 1)], axis=1)
+    which = np.repeat(every, times.size)
+    column = np.tile(np.arange(times.size), every.size) + times.size * (which >= checks.n_shape)
+    highest = excess(which, checks.values(which, shapes, column=column))
     most = highest.reshape(every.size, mesh.n, -1).max(axis=2)
     around = np.pad(most, ((0, 0), (1, 1)), constant_values=-np.inf)
     peak = (most >= around[:, :-2]) & (most >= around[:, 2:])
     which, cells = np.nonzero((most > -_NEAR) | (peak & (most > -_FAR)))
 
     def at_times(t: np.ndarray) -> np.ndarray:
-        return excess(np.repeat(which, t.shape[1]), t.ravel()).reshape(t.shape)
+        of = np.repeat(which, t.shape[1])
+        values = checks.values(of, checks.shapes(gaits, table, of, t.ravel()))
+        return excess(of, values).reshape(t.shape)
 
     return which, cells, peaks(at_times, mesh.edges[cells], mesh.h[cells])[0]
 

@@ -6,6 +6,7 @@
 
 #include <stdlib.h>
 
+#include "contacts.h"
 #include "repeating.h"
 
 #ifdef COLLOC_SOURCES
@@ -166,6 +167,24 @@ int colloc_repeating(
     }
     free_periods(&q);
     return done(&played, ready);
+}
+
+/* Functions of shapes (contacts.h), each instance of one, `which`, that begins at `first` in `numbers`, at a column of `shapes`
+   (n_joint, n_column), `column`, with `shares` (n) as there: values (n), and their slopes (n_joint, n) unless NULL. */
+int colloc_shape_functions(
+    int n_joint, ptrdiff_t n, const double *numbers, const long long *first, const long long *which, const long long *column,
+    ptrdiff_t n_column, const double *shapes, double *shares, double *values, double *slopes)
+{
+    double *shape = malloc(2 * (size_t)n_joint * sizeof *shape);
+    for (ptrdiff_t i = 0; i < n && shape; ++i) {
+        for (int j = 0; j < n_joint; ++j)
+            shape[j] = shapes[j * n_column + column[i]];
+        values[i] = shape_function(n_joint, numbers + first[which[i]], shape, shares + i, slopes ? shape + n_joint : NULL);
+        for (int j = 0; slopes && j < n_joint; ++j)
+            slopes[j * n + i] = shape[n_joint + j];
+    }
+    free(shape);
+    return shape ? 0 : 1;
 }
 
 /* An instant that the lanes lost, from where they began: more slowly and surely. */
