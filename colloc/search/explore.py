@@ -445,8 +445,13 @@ _SHAPES = 60  # that are drawn, and directions of rates at each
 
 @checkpoint
 def small_loops(problem: Problem) -> list[AnyGait]:
-    """Loops of the class that starts are drawn from, both ways round, best first; none where the
-    pace matters."""
+    """Small loops at the shapes where they travel farthest for their work, in the class that starts
+    are drawn from, both ways round, best first; none where the pace matters.
+
+    Dry friction lets a loop of any size move a body, and at a few shapes, such as folded ones,
+    which samples of a class hardly ever meet, small loops beat most large gaits. A linear program
+    gives the best one at a shape (`colloc.bounds.motions`); shapes are drawn from a coarse lattice.
+    """
     if problem.froude or not rate_independent(problem.law):
         return []
     body, law, joints = problem.body, problem.law, problem.joint_map

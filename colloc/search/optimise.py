@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -194,30 +196,6 @@ def leave_saddle(iterate: Iterate) -> Iterate | None:
     return None
 
 
-class _Projection:
-    """Minimise |v - target|^2 / 2 subject to the rows of a program and v' A v = target' A
-    target."""
-
-    def __init__(self, program: ReducedProgram, target: np.ndarray, area: np.ndarray) -> None:
-        self._program, self._target, self._area = program, target, area
-        self.lower, self.upper = program.lower, program.upper
-        enclosed = target @ area @ target
-        self.row_lower = np.append(program.row_lower, enclosed)
-        self.row_upper = np.append(program.row_upper, enclosed)
-
-    def objective(self, v: np.ndarray) -> float:
-        return 0.5 * float(np.sum((v - self._target) ** 2))
-
-    def gradient(self, v: np.ndarray) -> np.ndarray:
-        return v - self._target
-
-    def rows(self, v: np.ndarray) -> np.ndarray:
-        return np.append(self._program.rows(v), v @ self._area @ v)
-
-    def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        return np.vstack([self._program.row_slopes(v), 2 * self._area @ v])
-
-
 @checkpoint
 def project_to_zero_rotation(problem: Problem, gait: AnyGait, delta: float) -> AnyGait:
     """A gait near a given one that turns the body as prescribed and encloses the same area.
@@ -240,13 +218,23 @@ def project_to_zero_rotation(problem: Problem, gait: AnyGait, delta: float) -> A
     level |= free_otherwise | {"grade": 0.0, "towards": None}
     if problem.regime.free:
         level |= {"objective": EFFICIENCY, "froude": problem.regime.froude}
-    space, v = space_near(problem.with_(**level), gait)
-    program = ReducedProgram(space, delta)
+    space, target = space_near(problem.with_(**level), gait)
+    program, area = ReducedProgram(space, delta), enclosed_area(seeds, problem.body.n_joint)
     # limits of the angles are kept by the search that begins here
-    program.place_rows(np.zeros_like(v))
-    projection = _Projection(program, v, enclosed_area(seeds, problem.body.n_joint))
+    program.place_rows(np.zeros_like(target))
+    enclosed = target @ area @ target
+    nearest: Any = SimpleNamespace(
+        lower=program.lower,
+        upper=program.upper,
+        row_lower=np.append(program.row_lower, enclosed),
+        row_upper=np.append(program.row_upper, enclosed),
+        objective=lambda v: 0.5 * float(np.sum((v - target) ** 2)),
+        gradient=lambda v: v - target,
+        rows=lambda v: np.append(program.rows(v), v @ area @ v),
+        row_slopes=lambda v: np.vstack([program.row_slopes(v), 2 * area @ v]),
+    )
     # few steps: a start need not be perfect
-    return space.member(minimize(projection, v, np.inf, 1e-8, 30).v)
+    return space.member(minimize(nearest, target, np.inf, 1e-8, 30).v)
 
 
 def refine(iterate: Iterate) -> Iterate:

@@ -93,15 +93,12 @@ class Sensitivity:
 
     def facts(self) -> dict[str, Any]:
         """Plain numbers (JSON); None for what there is not."""
-        effects = []
-        for effect in self.effects:
-            again = []
-            for each in effect.again:
-                plain = vars(each) | {"behind": each.behind}
-                words = {name: plain.pop(name) for name in ("status", "breaks")}
-                finite = {name: float(x) if np.isfinite(x) else None for name, x in plain.items()}
-                again.append(finite | words)
-            effects.append(vars(effect) | {"again": again})
+
+        def plain(again: Again) -> dict[str, Any]:
+            every = (vars(again) | {"behind": again.behind}).items()
+            return {name: None if x in (np.inf, -np.inf) or x != x else x for name, x in every}
+
+        effects = [vars(each) | {"again": [*map(plain, each.again)]} for each in self.effects]
         return vars(self) | {"effects": effects}
 
     @property

@@ -71,10 +71,10 @@ class CrawlerBody(SmoothBody):
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        for name, low, high in (("epsilon", 0, 0.5), ("share", 0, 1)):
-            if not is_number(getattr(self, name)) or not low < getattr(self, name) < high:
+        for name, high in (("epsilon", 0.5), ("share", 1)):
+            if not 0 < getattr(self, name) < high:
                 raise ProblemError(
-                    f"{name} must lie between {low} and {high}, not {getattr(self, name)!r}."
+                    f"{name} must lie between 0 and {high}, not {getattr(self, name)!r}."
                 )
         check_count(12, least=2, modes=self.modes)
 

@@ -26,7 +26,7 @@ import numpy as np
 from colloc.mechanics.bodies import Body, Defaults
 from colloc.smooth.balance import Motion
 from colloc.smooth.smooth_body import SmoothBody
-from colloc.system.arguments import check_finite, check_positive, named_arguments
+from colloc.system.arguments import check_positive, named_arguments
 from colloc.system.errors import ProblemError
 
 _TURN = 2 * np.pi
@@ -187,7 +187,6 @@ class Concertina(PrescribedBody):
     def __post_init__(self) -> None:
         if self.bumps not in (1, 2):
             raise ProblemError(f"bumps must be 1 or 2, not {self.bumps!r}.")
-        check_finite(epsilon=self.epsilon, share=self.share, amplitude=self.amplitude)
         widest = 0.5 / self.bumps
         ends = {"epsilon": (widest, f"{widest:g} for {self.bumps} bump(s)"), "share": (1, "1")}
         for name, (most, words) in (ends | {"amplitude": (np.pi / 2, "pi/2")}).items():

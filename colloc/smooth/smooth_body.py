@@ -181,8 +181,11 @@ polynomials change fast towards the ends."""
 @named_arguments
 @dataclass(frozen=True)
 class ModalBody(SmoothBody):
-    """A smooth body of unit length with a few bending modes; its shape coordinates are their
+    """A smooth body of unit length with a few bending modes; its shape coordinates q are their
     amplitudes [rad].
+
+    ``Theta(s, t) = sum_m q_m(t) phi_m(s)``, s from 0 to 1. Modes have zero mean, so that Theta is
+    measured from the mean direction of the body.
 
     Parameters
     ----------

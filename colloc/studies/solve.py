@@ -44,7 +44,7 @@ from colloc.search.explore import with_reachable_distance
 from colloc.search.iterate import Iterate
 from colloc.search.solve import REDUCED
 from colloc.search.solve import solve as search_solve
-from colloc.system.arguments import check_count, is_whole, shown
+from colloc.system.arguments import check_count, shown
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import run_file
 from colloc.system.task_pool import Lost, Task, pool_for, process_pool, run_tasks
@@ -271,10 +271,7 @@ def multistart(
     True
     """
     check_count(starts=starts, workers=workers)
-    if not is_whole(seed, 0, LARGEST_SEED):
-        raise ProblemError(
-            f"seed must be a whole number from 0 to {LARGEST_SEED}, not {shown(seed)}."
-        )
+    check_count(LARGEST_SEED, least=0, seed=seed)
     if sampler not in SAMPLERS:
         raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {shown(sampler)}.")
     if not time_limit > 0:

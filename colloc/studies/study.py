@@ -17,7 +17,7 @@ import numpy as np
 from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import place_of, stated_names, words_of
 from colloc.gaits.starts import LARGEST_SEED
-from colloc.system.arguments import is_whole, named_arguments, shown
+from colloc.system.arguments import check_count, named_arguments, shown
 from colloc.system.errors import ProblemError
 from colloc.system.files import check_name
 
@@ -146,16 +146,10 @@ class Study:
         check_name(self.name)
         if not callable(self.problem):
             raise ProblemError("problem must be a function from coordinates to a Problem.")
-        for field, least in (("cold_starts", 0), ("warm_starts", 1), ("chunk", 1), ("seed", 0)):
-            value = getattr(self, field)
-            if not is_whole(value, least, LARGEST_SEED):
-                raise ProblemError(
-                    f"{field} must be a whole number from {least} to {LARGEST_SEED}, not "
-                    f"{shown(value)}."
-                )
-        limit = self.time_limit
-        if isinstance(limit, bool) or not isinstance(limit, (int, float)) or not limit > 0:
-            raise ProblemError(f"time_limit must be positive, not {limit!r}.")
+        check_count(LARGEST_SEED, least=0, cold_starts=self.cold_starts, seed=self.seed)
+        check_count(LARGEST_SEED, warm_starts=self.warm_starts, chunk=self.chunk)
+        if not self.time_limit > 0:
+            raise ProblemError(f"time_limit must be positive, not {self.time_limit!r}.")
         if (cells := math.prod(self.shape)) > MOST_CELLS:
             raise ProblemError(f"a study may have {MOST_CELLS} cells, not {cells}; split it.")
 

@@ -452,7 +452,9 @@ def forward_share(gait: Fourier, body: Body, friction: Law) -> float:
 def class_name(
     bilateral: bool, antipodal: bool, retraced: bool, wave: float, forward: float
 ) -> str:
-    """The kind of wave and the symmetries in words, as "retrograde, both"."""
+    """The kind of wave of bending, as in the paper's figure 1, and the symmetries in words, as
+    "retrograde, both": *retrograde* against the motion, *direct* along it, *standing* where
+    joints bend in phase."""
     moving = not retraced and abs(wave * forward) >= _STANDING
     kind = ("direct" if wave * forward > 0 else "retrograde") if moving else "standing"
     symmetries = ["bilateral"] * bilateral + ["antipodal"] * antipodal

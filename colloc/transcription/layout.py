@@ -3,7 +3,8 @@ from a gait, through the balance solver."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ from colloc.dynamics.dynamics import OMEGA, PeriodTotals, Shapes
 from colloc.gaits.objective import chord_per_way
 from colloc.mechanics.bodies import FULL
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.densities import Quantity
 from colloc.mechanics.inertia import STATES
 from colloc.numerics.mesh import Mesh
 
@@ -23,45 +23,17 @@ RADIANS = 2 * np.pi
 """Radians of phase per period."""
 
 
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """Index arrays ``(n_component, n_position)`` into x; those that a problem has no use for are
-    empty."""
+class Layout(SimpleNamespace):
+    """Index arrays ``(n_component, n_position)`` into the vector x of n variables; those that a
+    problem has no use for are empty.
 
-    # of the period
-    parameters: np.ndarray
-    static: np.ndarray
-    totals: np.ndarray
-    # at the mesh's sites
-    theta: np.ndarray
-    momenta: np.ndarray
-    # at its edges
-    distance: np.ndarray
-    work: np.ndarray
-    # at its points, of a lifted chain: of links, contacts, joints
-    directions: np.ndarray
-    spins: np.ndarray
-    vx: np.ndarray
-    vy: np.ndarray
-    friction: np.ndarray
-    speed: np.ndarray
-    """Of the shape, where delta is relative to it."""
-    joint_fx: np.ndarray
-    joint_fy: np.ndarray
-    moments: np.ndarray
-    # with inertia
-    x: np.ndarray
-    """Midpoints from the centre of mass."""
-    y: np.ndarray
-    centre: np.ndarray
-    """Its velocity, force and moment about it."""
-    accelerations: np.ndarray
-    # of other bodies
-    angles: np.ndarray
-    rates: np.ndarray
-    z: np.ndarray
-    n: int
-    integrals: tuple[Quantity, ...] = ()
+    Of the period: parameters, static, totals (of the integrals). At the mesh's sites: theta,
+    momenta. At its edges: distance, work. At its points, of the links of a lifted chain:
+    directions, spins, vx, vy; of contacts: friction; speed, of the shape, where delta is relative
+    to it; of joints: joint_fx, joint_fy, moments. With inertia: x, y, midpoints from the centre of
+    mass; centre, its velocity, force and moment about it; accelerations. Of other bodies: angles,
+    rates, z.
+    """
 
     @property
     def decisions(self) -> np.ndarray:
@@ -74,11 +46,12 @@ class Layout:
         places = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
         places |= {"distance": self.distance[0, -1:], "work": self.work[0, -1:]}
         places |= {"rotation": self.theta[0, [-1, 0]], "period": self.static[:1, 0]}
-        return places[name]
+        return np.asarray(places[name])
 
     def shape_speed(self, x: np.ndarray) -> np.ndarray:
-        speed: np.ndarray = x[self.speed[0]] if self.speed.size else x[self.rates]
-        return speed if speed.ndim == 1 else np.linalg.norm(speed, axis=0)
+        if self.speed.size:
+            return x[self.speed[0]]
+        return np.asarray(np.linalg.norm(x[self.rates], axis=0))
 
     def tail_velocity(self, body: Any, x: np.ndarray) -> np.ndarray:
         if self.z.size:

@@ -86,7 +86,8 @@ def integrate_period(
     jacobian: Callable[[float, np.ndarray], np.ndarray] | None = None,
 ) -> Course:
     """Follow states from `begin` ``(n_state,)`` at phase 0 to 1, each to about a tolerance, by
-    steps no longer than `longest`; `NotConvergedError` if the solver cannot go on.
+    adaptive multistep methods of steps no longer than `longest`; `NotConvergedError` if the solver
+    cannot go on.
 
     rates: of a phase, the states and what it last said to remember (None at first), such as
     velocities from which the next balance may start: their rates, and what to remember. breaks:

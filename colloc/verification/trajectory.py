@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.system.arguments import shown
+from colloc.system.arguments import check_finite, shown
 from colloc.system.errors import ProblemError
 from colloc.verification.adaptive_motion import Path
 
@@ -50,19 +50,16 @@ def plan_trajectory(
     """
     from scipy.optimize import brentq
 
-    if not np.isfinite(rate) or rate <= 0:
-        raise ProblemError(f"the sample rate must be positive, not {rate:g}.")
+    check_finite(positive=True, rate=rate, period=1.0 if period is None else period)
     vertices, _ = path(_PHASES)
     most = np.full(len(vertices), np.inf)
     if limits is not None:
         most = one_each(limits, len(vertices), "joint speed limit")
+    elif period is None:
+        raise ProblemError("a trajectory needs a period in seconds or joint speed limits.")
     slowest = _slowest(vertices, most, keep_pace)
     shortest = float(slowest.mean())
-    if period is None and limits is None:
-        raise ProblemError("a trajectory needs a period in seconds or joint speed limits.")
-    wanted = shortest if period is None else float(period)
-    if not np.isfinite(wanted) or wanted <= 0:
-        raise ProblemError(f"the period must be positive, not {wanted:g} s.")
+    wanted = shortest if period is None else period
     if wanted < shortest * (1 - 1e-9):
         kept = " at the gait's own pace, which matters here" if keep_pace else ""
         raise ProblemError(
