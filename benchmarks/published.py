@@ -43,7 +43,7 @@ from colloc.gaits.gait_fields import AnyGait as Gait
 from colloc.mechanics.law import Law
 from colloc.search.solve import solve
 from colloc.smooth.balance import Motion
-from colloc.smooth.prescribed_body import Wave
+from colloc.smooth.smooth_body import Wave
 from scripts.models.period import period
 from scripts.program import command_line
 

@@ -11,9 +11,9 @@ from colloc.mechanics.floor_contact import Foot as Foot, Pad as Pad, Wheel as Wh
 from colloc.mechanics.densities import PathLimit as PathLimit
 from colloc.mechanics.densities import Quantity as Quantity
 from colloc.smooth.smooth_body import ModalBody as ModalBody
-from colloc.smooth.prescribed_body import Concertina as Concertina
-from colloc.smooth.crawler_body import CrawlerBody as CrawlerBody
-from colloc.smooth.prescribed_body import Wave as Wave
+from colloc.smooth.smooth_body import Concertina as Concertina
+from colloc.smooth.smooth_body import CrawlerBody as CrawlerBody
+from colloc.smooth.smooth_body import Wave as Wave
 from colloc.mechanics.friction import Axle as Axle
 from colloc.mechanics.friction import Friction as Friction
 from colloc.laws.resistance import Elliptic as Elliptic
@@ -39,7 +39,7 @@ from colloc.results.solution import Solution as Solution
 from colloc.results.store import load as load, save as save
 from colloc.pictures.export import Servo as Servo
 from colloc.search.evaluate import evaluate as evaluate
-from colloc.search.identify import identify as identify
+from colloc.search.evaluate import identify as identify
 from colloc.search.certify import certify as certify
 from colloc.verification.replay import replay as replay
 from colloc.verification.differential_motion import slope_motion as slope_motion

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colloc.bounds.motions import CoulombMotion, Domain, climb_from_lattice
-from colloc.bounds.potential import PotentialSpace, TensorSpline
+from colloc.bounds.sampled import PotentialSpace, TensorSpline
 from colloc.laws.resistance import Elliptic
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.friction import Friction

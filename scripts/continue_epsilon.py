@@ -16,7 +16,7 @@ import numpy as np
 
 from colloc.gaits.problem import Problem
 from colloc.mechanics.friction import Friction
-from colloc.smooth.prescribed_body import Concertina
+from colloc.smooth.smooth_body import Concertina
 from scripts.models.period import Period, measured_period, period
 from scripts.program import command_line
 

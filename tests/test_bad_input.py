@@ -9,8 +9,7 @@ import pytest
 
 import colloc
 from colloc import Chain, Foot, Friction, Harmonic, PowerLaw, Problem, ProblemError, Wave
-from colloc.bounds.potential import TensorSpline
-from colloc.bounds.sampled import Budget, efficiency_bound
+from colloc.bounds.sampled import Budget, TensorSpline, efficiency_bound
 from colloc.gaits.prescribed import Prescribed
 from colloc.smooth.balance import Motion, solve_smooth
 from colloc.system.errors import OrderWarning

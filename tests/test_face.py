@@ -23,7 +23,7 @@ WITH_EXAMPLES = [
     for path in sorted((ROOT / "colloc").glob("*/*.py"))
     if ">>> " in path.read_text(encoding="utf-8")
 ]
-LONG = ("studies.solve", "studies.families", "search.identify", "verification.differential_motion")
+LONG = ("studies.solve", "studies.families", "search.evaluate", "verification.differential_motion")
 QUICK = colloc.Problem("quick", gait=colloc.Harmonic(1, "bilateral"), delta=1e-2)
 
 

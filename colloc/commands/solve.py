@@ -437,7 +437,7 @@ def evaluate(options: argparse.Namespace) -> int:
     cli.option(float, "--mu-forward MU", "the forward coefficient, measured separately", least=0),
 )
 def identify(options: argparse.Namespace) -> int:
-    from colloc.search.identify import identify as identify_friction
+    from colloc.search.evaluate import identify as identify_friction
 
     problem = read_problem_file(options.problem).problem
     names = ("period", "harmonics", "degrees", "length", "mu_forward")

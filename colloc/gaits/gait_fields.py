@@ -22,9 +22,7 @@ from colloc.laws.resistance import Elliptic, PowerLaw, Viscous
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.floor_contact import FeetLaw, Foot
 from colloc.mechanics.friction import Axle, Friction
-from colloc.smooth.crawler_body import CrawlerBody
-from colloc.smooth.prescribed_body import Concertina, Wave
-from colloc.smooth.smooth_body import ModalBody
+from colloc.smooth.smooth_body import Concertina, CrawlerBody, ModalBody, Wave
 from colloc.system.arguments import STATED_IF_SET
 from colloc.system.errors import ProblemError
 

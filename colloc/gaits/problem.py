@@ -35,7 +35,7 @@ from colloc.mechanics.densities import (
 from colloc.mechanics.friction import Friction
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.schemes import scheme
-from colloc.smooth.prescribed_body import schedule
+from colloc.smooth.smooth_body import schedule
 from colloc.system.arguments import (
     STATED_IF_SET,
     check_finite,

@@ -1,22 +1,34 @@
-"""Evaluation of a given gait: replayed, certified except for optimality, and a solution like any
-other."""
+"""Given gaits: replayed, certified except for optimality, and solutions like any other; and the
+coefficients of friction under which a body whose joint angles were measured goes the measured way.
+
+For those the motion is solved for; origin and direction of the measured axes follow in closed form.
+What is left is least squares on logarithms x of the coefficients over the stated ones. Errors are
+those of the residuals, as many as are independent, and of the samples of the joint angles.
+"""
 
 from __future__ import annotations
 
 import math
+import os
+import re
 import time
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import stdtrit
 
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.coupled import Coupled
-from colloc.gaits.fitted_gait import Given, Uncertainty, fitted_gait
+from colloc.gaits.fitted_gait import COVERED, Given, Uncertainty, correlation_time, fitted_gait
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
+from colloc.gaits.parameters import COEFFICIENTS, parameters
 from colloc.gaits.problem import Problem
+from colloc.gaits.record import FEWEST, HEADINGS, Column, Record
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.densities import JointMap
@@ -26,12 +38,14 @@ from colloc.reduced.motion import ReducedMotion
 from colloc.reduced.program import SearchSpace
 from colloc.results.answer import EVALUATED, Answer
 from colloc.results.checks import UNCERTIFIED
+from colloc.results.motion import lab_outline
 from colloc.results.solution import Solution, direction_of_travel
 from colloc.search.certify import certify, goes_nowhere
 from colloc.search.confirm import answer_of_iterate
 from colloc.search.iterate import evaluate_at
 from colloc.search.options import OPTIONS, TOLERANCES, settings
-from colloc.smooth.prescribed_body import schedule
+from colloc.smooth.smooth_body import schedule
+from colloc.system.arguments import check_finite
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.mesh_error import plan_mesh
 
@@ -270,3 +284,340 @@ class _Series(NamedTuple):
 
     def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
         return np.einsum("kjt,wt->kjw", on_points, self.functions[2]).reshape(len(on_points), -1)
+
+
+_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180, "°": np.pi / 180}
+_POINTS = {"tail": 0, "centre": 1, "center": 1, "head": 2}
+_ACCURACY = 1e-5  # of the motion [body lengths]
+_STEP = 1e-3  # of x in differences
+_VAGUE, _HELD = 3.0, 1e-2
+"""Standard deviations of x before anything is measured, and of what the motion does not tell."""
+_FARTHEST = math.log(100.0)  # largest x
+_UNTOLD = 0.5  # standard deviation of x from which the motion does not tell it
+_MISSED, _ALIKE = 0.1, 3.0
+"""Residual over the extent of the path, and like samples in a row, from which no coefficients
+explain it."""
+_PART = 0.3  # of the largest change, that is named
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    problem: Problem = field(repr=False)  # with this friction
+    coefficients: dict[str, tuple[float, float]]
+    """Values and errors, two standard deviations; these are infinite where the motion does not tell
+    a coefficient, and 0 where it is as stated."""
+    before: float
+    """Root mean square distance of the predicted path from the measured one with the stated
+    coefficients [body lengths; rad if there are headings alone]."""
+    after: float  # with the identified ones
+    remarks: tuple[str, ...]  # what the motion does not tell
+    message: str  # what was read
+
+    @property
+    def line(self) -> str:
+        """For the problem file."""
+        body: Any = self.problem.body
+        feet = getattr(body, "feet", ())
+        if not any(foot.friction is not None for foot in feet):
+            return f"friction={self.problem.friction!r}"
+        plain = tuple(
+            replace(foot, weight=None) for foot in feet
+        )  # weights are said if they differ
+        text = repr(plain if replace(body, feet=plain).feet == feet else feet)
+        text = re.sub(r", (weight=None|(offset|angle|extent)=0\.0)\b", "", text)
+        return "feet=" + re.sub(r"(?<=place=)0\.\d+", lambda x: f"{float(x[0]):.6g}", text)
+
+    def facts(self) -> dict[str, Any]:
+        """Plain numbers (JSON); None for an error that is infinite."""
+        finite = {x: [v, e if e < math.inf else None] for x, (v, e) in self.coefficients.items()}
+        plain = {name: getattr(self, name) for name in ("before", "after", "remarks", "message")}
+        return {"coefficients": finite, **plain, "line": self.line}
+
+    def __str__(self) -> str:
+        words = {0.0: "as stated", math.inf: "not determined by this motion"}
+        rows = [
+            f"{name:<10}  {value:<8.4g} {words.get(error, f'+- {error:.2g}')}"
+            for name, (value, error) in self.coefficients.items()
+        ]
+        off = f"{self.before:.2g} before, {self.after:.2g} after"
+        rows += [f"predicted path off by {off} (r.m.s.)", *self.remarks, self.line]
+        return "\n".join(f"  {row}" for row in rows)
+
+
+def identify(
+    problem: Problem,
+    record: str | os.PathLike[str],
+    *,
+    length: float | None = None,
+    mu_forward: float | None = None,
+    period: float | None = None,
+    harmonics: int | None = None,
+    degrees: bool = False,
+) -> Identified:
+    """Identify coefficients of friction from measured joint angles and the way that a body went.
+
+    Slow motion under dry friction tells ratios of coefficients alone: the forward one is taken as
+    stated. With inertia all of them are found.
+
+    Parameters
+    ----------
+    problem : Problem
+        Body and law of friction; the search begins at its coefficients.
+    record : path of a CSV file
+        Times and joint angles as for `colloc.evaluate`, over one or more periods, and places: x, y
+        of the centre of mass, head_x, head_y, tail_x, tail_y; perhaps the direction of the tail
+        link, theta, yaw or heading, or head_theta. Or markers at all ends and joints, which tell
+        the angles too. Axes may lie anywhere, y to the left of x.
+    length : float, optional
+        Of the body [m], if places are in m or, by their names, cm or mm; by default that of the
+        problem's robot. Without any they are in body lengths.
+    mu_forward : float, optional
+        The forward coefficient as measured otherwise, where motion tells ratios alone; by default
+        the stated one.
+    period, harmonics, degrees
+        See `colloc.evaluate`.
+
+    Returns
+    -------
+    Identified
+        Its `problem` has the friction that was found, `coefficients` has values and errors.
+
+    Raises
+    ------
+    ProblemError
+        If the record cannot be read or holds no path, or the problem is one on a slope, of a
+        prescribed motion, or under a law without coefficients.
+    NotConvergedError
+        If the motion cannot be computed.
+
+    Examples
+    --------
+    A record as of a robot on a floor that one does not know:
+
+    >>> import tempfile, colloc
+    >>> gait, floor = colloc.ellipse(A0=0.3, A1=1.6, B1=1.1), colloc.Problem("floor", delta=1e-3)
+    >>> carpet = floor.with_(friction=colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3))
+    >>> record = tempfile.mkdtemp() + "/record.csv"
+    >>> colloc.evaluate(carpet, gait).to_dataframe()[::10].to_csv(record)
+    >>> colloc.identify(floor, record).problem.friction
+    Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
+    """
+    if problem.regime.slides or schedule(problem.body) or problem.regime.free is not None:
+        raise ProblemError(
+            f"{problem.name} is no gait on the level at one pace: state a problem of such gaits."
+        )
+    length = length or getattr(problem.robot, "length", None)
+    if length is not None:
+        check_finite(positive=True, length=length)
+    how: Any = {"period": period, "harmonics": harmonics, "degrees": degrees}
+    if isinstance(problem.body, Chain) and not problem.joint_map:
+        how["body"] = problem.body  # whose angles markers may tell
+    fitted = fitted_gait(path := Path(record), problem.n_motor, **how)
+    read: Any = fitted.record
+    measured, used = _measured(path, read, length)
+    fit = _Fit(problem.without_robot, measured, fitted.gait, read.time / fitted.period)
+    if mu_forward is not None:
+        check_finite(positive=True, mu_forward=mu_forward)
+        if not fit.only_ratios:
+            raise ProblemError(
+                "with inertia the motion determines all coefficients: leave mu_forward out."
+            )
+        fit.stated *= mu_forward / fit.stated[fit.forward]
+    x = np.zeros(len(fit.free))
+    before = fit.rms(fit.off(x))
+    for _ in range(2):  # then with the noise of places and of headings
+        x = fit.best(x)
+    alike, covariance = fit.covariance(x, fitted.uncertainty)
+    squares, directions = np.linalg.eigh(covariance) if x.size else (x, covariance)
+    untold = directions.T[squares > _UNTOLD**2]
+    if untold.size:
+        fit.prior = np.vstack([fit.prior, untold / _HELD])
+        x = fit.best(0 * x)
+    deviations, errors = np.sqrt(np.diag(covariance)), np.zeros(len(fit.names))
+    errors[fit.free] = np.where(deviations < _UNTOLD, deviations, np.inf)
+    values, after = fit.values(x), fit.rms(fit.off(x))
+    errors *= values * float(stdtrit(max(fit.freedom / alike, 1.0), COVERED))
+    remarks = [fit.describe(direction) for direction in untold]
+    if fit.only_ratios:
+        remarks.append(
+            f"Slow motion determines only ratios: a common factor, here fixed by "
+            f"{fit.names[fit.forward]} as stated, changes only torques and work."
+        )
+    if untold.size and fit.only_ratios and "rolling" in fit.names:
+        remarks.append(
+            "Slow motion on axles may be the same for other coefficients: record a faster gait, in "
+            "which inertia counts."
+        )
+    elif after > _MISSED * fit.extent and alike > _ALIKE:
+        remarks.append(
+            "No coefficients reproduce the path: are lengths, order and signs of joints, and y "
+            "right?"
+        )
+    points = [name for name, k in _POINTS.items() if fit.seen[0, k].any() and name != "center"]
+    unit = f"lengths of {length:g} m" if length else "lengths"
+    message = f"{fitted.describe(used)}; path of {', '.join(points) or 'headings'} in body {unit}"
+    both = zip(values.tolist(), errors.tolist(), strict=True)
+    coefficients = dict(zip(fit.names, both, strict=True))
+    return Identified(fit.with_(x, 5), coefficients, before, after, tuple(remarks), message)
+
+
+def _measured(path: Path, record: Record, length: float | None) -> tuple[np.ndarray, list[Column]]:
+    """Measured places of tail, centre and head, and directions there, ``(2, 3, n_time)``, both
+    complex; NaN where there is none. And the columns that tell them."""
+    used = list[Column]()
+    table = np.full((3, 3, record.time.size), np.nan)  # x, y, angle; of each
+    if record.path is not None:  # of centre and tail
+        table[:2, [1, 0]] = record.path.transpose(1, 0, 2)
+    for column, row in record.others if record.path is None else ():
+        words = {*column.words}
+        what = next((word for word in column.words if word in {"x", "y", *HEADINGS}), "")
+        if not what or words - {what, "pos", "position", *_UNITS, *_POINTS}:
+            continue
+        unit, is_place = next(iter(words & {*_UNITS}), ""), what in "xy"
+        if is_place and unit and length is None:
+            raise ProblemError(
+                f"{path}: {column.name} is in {unit}: give the length of the body [m]."
+            )
+        point = next((_POINTS[word] for word in words if word in _POINTS), int(is_place))
+        scale = _UNITS.get(unit, 1.0) / ((is_place and length) or 1.0)
+        table["xy".find(what), point] = scale * row
+        used.append(column)
+    measured = np.array([table[0] + 1j * table[1], np.exp(1j * table[2])])
+    counts = np.isfinite(measured).sum(axis=2)
+    if min(counts[counts > 0], default=0) < FEWEST:
+        raise ProblemError(
+            f"{path} holds no path of the body: give columns x and y of the centre of mass, or "
+            f"head_x, head_y, tail_x, tail_y, or theta."
+        )
+    return measured, used
+
+
+class _Fit:
+    def __init__(
+        self, problem: Problem, measured: np.ndarray, gait: Fourier, phases: np.ndarray
+    ) -> None:
+        self.problem, self.gait, self.phases = problem, gait, phases
+        symbols = {text: x for x, text in COEFFICIENTS.items() if x != "power"}
+        groups: dict[str, tuple[float, list[int]]] = {}
+        for k, number in enumerate(parameters(problem)):
+            words, *feet = number.name.split(" of f")
+            if words in symbols:
+                name = " of f".join([symbols[words], *feet])
+                forwards = name.replace("mu_b of", "mu_f of")  # a wheel rolls both ways alike
+                if groups.get(forwards, (None,))[0] == number.value:
+                    name = forwards
+                groups.setdefault(name, (number.value, []))[1].append(k)
+        if not groups:
+            raise ProblemError(f"{problem.name} has a law without coefficients: state Friction().")
+        values, self.groups = zip(*groups.values(), strict=True)
+        self.stated, short = np.array(values), [name.split(" of ")[0] for name in groups]
+        self.names = short if len({*short}) == len(short) else [*groups]
+        along = {"mu_f", "tangential", "rolling"}
+        self.forward = next((k for k, x in enumerate(short) if x in along), 0)
+        self.only_ratios = not problem.froude and problem.law.degree is not None
+        every = range(len(short))
+        self.free = [k for k in every if k != self.forward or not self.only_ratios]
+        self.prior = np.eye(len(self.free)) / _VAGUE
+        self.noise = np.full((2, 1), 1e-3)  # of places and of headings
+        self.seen = np.isfinite(measured)
+        self.measured = np.where(self.seen, measured, 0)
+        # less the numbers that place the axes
+        counts, axes = self.seen.sum(axis=(1, 2)), self.seen.any(axis=2).sum(axis=1)
+        self.counts = counts * [2, 1] - [3 * (axes[0] > 0), axes[1]]
+        self.freedom = max(float(self.counts.sum()) - len(self.free), 1.0)
+        self.extent = self.rms(self.off_from(np.array([0 * phases, 0 * phases + 1])[:, None]))
+        for_path = with_motors(problem.with_(objective=EFFICIENCY), gait)
+        self.mesh = on_fine_mesh(*for_path).mesh
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        values = self.stated.copy()
+        values[self.free] *= np.exp(x)
+        return values
+
+    def with_(self, x: np.ndarray, digits: int = 12) -> Problem:
+        changed = self.problem
+        for group, value in zip(self.groups, self.values(x), strict=True):
+            for which in group:
+                number = parameters(changed)[which]
+                changed = number.changed(float(f"{value:.{digits}g}") / number.value - 1)
+        return changed
+
+    def off(self, x: np.ndarray, motors: Fourier | None = None) -> np.ndarray:
+        problem, gait = with_motors(self.with_(x), motors or self.gait)
+        motion = on_mesh(problem, gait, self.mesh).motion.sample(self.phases)
+        centre, outline = (
+            x + 1j * y for x, y in (motion.centre, lab_outline(problem.body, motion))
+        )
+        tail, head = np.exp(1j * motion.theta), np.exp(1j * np.angle(outline[-1] - outline[-2]))
+        return self.off_from(np.array([[outline[0], centre, outline[-1]], [tail, tail, head]]))
+
+    def off_from(self, predicted: np.ndarray) -> np.ndarray:
+        """Predicted places less measured ones, and the angles between directions, in the axes that
+        fit best, ``(2, 3, n_time)``."""
+        places, turns = np.where(self.seen, predicted, 0)
+        at, measured = (
+            each - self.seen[0] * each.sum() / max(self.seen[0].sum(), 1)
+            for each in (places, self.measured[0])
+        )
+        turn, between = np.vdot(at, measured), turns * self.measured[1].conj()
+        angles = np.angle(between * between.sum(axis=1, keepdims=True).conj())
+        return np.where(self.seen, [at * turn / max(abs(turn), 1e-300) - measured, angles], 0)
+
+    def rms(self, off: np.ndarray) -> float:
+        """Of places, or of headings if there are none."""
+        which = int(not self.seen[0].any())
+        return float(np.sqrt((np.abs(off[which]) ** 2).sum() / self.seen[which].sum()))
+
+    def rows(self, x: np.ndarray, motors: Fourier | None = None) -> np.ndarray:
+        """What squares are least of: residuals over their noise, and x over its own."""
+        places, angles = self.off(x, motors).reshape(2, -1) / self.noise
+        return np.concatenate([places.real, places.imag, angles.real, self.prior @ x])
+
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        steps = _STEP * np.eye(x.size)
+        return np.transpose([(self.rows(x + h) - self.rows(x - h)) / (2 * _STEP) for h in steps])
+
+    def best(self, x: np.ndarray) -> np.ndarray:
+        """The best x, and the noise there."""
+        if x.size:
+            how: Any = {"bounds": (-_FARTHEST, _FARTHEST), "xtol": 1e-6}
+            x = least_squares(self.rows, x, self.slopes, **how).x
+        left = (np.abs(self.off(x)) ** 2).sum(axis=(1, 2))
+        share = self.freedom / self.counts.sum()
+        self.noise = np.sqrt(left / np.maximum(self.counts * share, 1))[:, None] + _ACCURACY
+        return x
+
+    def covariance(self, x: np.ndarray, samples: Uncertainty | None) -> tuple[float, np.ndarray]:
+        """Number of residuals in a row that are alike, and the covariance of x."""
+        places, angles = self.off(x)
+        alike = max(map(correlation_time, (places.real, places.imag, angles.real)))
+        if not x.size:
+            return alike, np.empty((0, 0))
+        self.noise *= alike**0.5
+        slopes, here = self.slopes(x), self.rows(x)
+        covariance = np.linalg.inv(slopes.T @ slopes)
+        if samples is not None:
+            most = max(samples.directions.shape[2] // 2, self.gait.n_harmonic)
+            table = self.gait.resize(most).table
+            others = [Fourier.from_table(table + each) for each in samples.directions]
+            others += [samples.richer] if samples.richer is not None else []
+            moved = np.array([self.rows(x, each) - here for each in others])
+            effects = covariance @ slopes.T @ moved.T
+            covariance += effects @ effects.T
+        return alike, covariance
+
+    def describe(self, direction: np.ndarray) -> str:
+        """Sentence about a change of x that the motion does not show."""
+        change = np.zeros(len(self.names))
+        change[self.free] = direction / np.abs(direction).max()
+        # any factor of all is left out, so as to name few
+        shifts = [0.0, *change] if self.only_ratios else [0.0]
+        change = min((change - c for c in shifts), key=lambda c: (np.abs(c) > _PART).sum())
+        parts = np.flatnonzero(np.abs(change) > _PART)
+        names = " and ".join(self.names[k] for k in parts)
+        if parts.size == 1:
+            others = " and ".join(name for name in self.names if name != names)
+            why = "it does not change the motion"
+            return f"This gait cannot distinguish {names} from {others}: {why}."
+        by = ", ".join(f"{self.names[k]} {100 * np.expm1(0.1 * change[k]):+.0f} %" for k in parts)
+        return f"This gait cannot distinguish {names}: the motion is the same with {by}."

@@ -19,8 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from colloc.bounds.motions import Domain
-from colloc.bounds.potential import PotentialSpace
-from colloc.bounds.sampled import Bound
+from colloc.bounds.sampled import Bound, PotentialSpace
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import near_contacts
 from colloc.mechanics.friction import Friction

@@ -8,8 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from colloc.bounds.potential import DEGREE, PotentialSpace, TensorSpline
-from colloc.bounds.sampled import Bound
+from colloc.bounds.sampled import DEGREE, Bound, PotentialSpace, TensorSpline
 from colloc.mechanics.chain import Chain
 from research.guarantee.enclosure import WIDER, Cells, ReferencePoint, spread
 from research.guarantee.kernel import call

@@ -10,7 +10,7 @@ import numpy as np
 from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
-from colloc.smooth.prescribed_body import Wave
+from colloc.smooth.smooth_body import Wave
 from problems import concertina, concertina_anisotropic
 from scripts.continue_epsilon import (
     Crawler,

@@ -9,8 +9,15 @@ import pytest
 
 from colloc import Chain, Friction
 from colloc.bounds.motions import CoulombMotion, Domain, admissible
-from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
-from colloc.bounds.sampled import Bound, Budget, compute_bound, efficiency_bound
+from colloc.bounds.sampled import (
+    Bound,
+    Budget,
+    PotentialSpace,
+    Samples,
+    TensorSpline,
+    compute_bound,
+    efficiency_bound,
+)
 from research import small_gaits
 from research.guarantee.potential_range import potential_space
 from research.small_gaits import balanced_motion, best_small_gait, small_gait

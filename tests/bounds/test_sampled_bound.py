@@ -13,8 +13,16 @@ import colloc
 from colloc import Chain, Foot, Friction, Harmonic, ModalBody, Problem, ProblemError, solve_balance
 from colloc.bounds.motions import CoulombMotion, Domain, fundamental, two_resting
 from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
-from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline, largest_gain
-from colloc.bounds.sampled import Budget, bound_key, efficiency_bound, smallest_maximum
+from colloc.bounds.sampled import (
+    Budget,
+    PotentialSpace,
+    Samples,
+    TensorSpline,
+    bound_key,
+    efficiency_bound,
+    largest_gain,
+    smallest_maximum,
+)
 from colloc.mechanics.balance import instant, total_power
 from research.small_gaits import balanced_motion, small_gait
 from tests.shared.mechanics import coulomb

@@ -179,7 +179,7 @@ def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(
     (tmp_path / "p.py").write_text(GOOD, encoding="utf-8")
     good = tmp_path / "quick.h5"
     good.write_bytes(b"a good result")
-    monkeypatch.setattr("colloc.search.ipopt.TOLERANCES", Tolerances(kkt=1e-30))
+    monkeypatch.setattr("colloc.search.confirm.TOLERANCES", Tolerances(kkt=1e-30))
     assert colloc(["solve", f"{tmp_path}/p.py", "--output", str(tmp_path), "--no-figure"]) == 3
     assert "not converged" in capsys.readouterr().out
     assert good.read_bytes() == b"a good result"

@@ -10,8 +10,14 @@ from shared.address_sanitizer import stays_within_its_arrays
 
 from colloc import Chain, Elliptic, Friction, ProblemError
 from colloc.bounds.motions import CoulombMotion, Domain
-from colloc.bounds.potential import PotentialSpace, Samples, TensorSpline
-from colloc.bounds.sampled import Bound, Budget, efficiency_bound
+from colloc.bounds.sampled import (
+    Bound,
+    Budget,
+    PotentialSpace,
+    Samples,
+    TensorSpline,
+    efficiency_bound,
+)
 from colloc.mechanics.contact import crossing_depth
 from research.guarantee import enclosure, guaranteed
 from research.guarantee.enclosure import DELTA, by_convexity, by_loads, corner_motions

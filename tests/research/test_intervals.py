@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from colloc import Chain, Elliptic, Friction
-from colloc.bounds.potential import DEGREE, PotentialSpace, TensorSpline
+from colloc.bounds.sampled import DEGREE, PotentialSpace, TensorSpline
 from research.guarantee import kernel
 from research.guarantee.c_compiler import compiled_library
 from research.guarantee.enclosure import CORNERS, DELTA, Cells, states

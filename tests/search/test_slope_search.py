@@ -14,7 +14,7 @@ from colloc.gaits.gait_fields import fields, gait_from
 from colloc.mechanics.bodies import FULL
 from colloc.reduced.program import ReducedProgram
 from colloc.search.certify import gait_certificate
-from colloc.search.ipopt import Solver
+from colloc.search.confirm import Solver
 from colloc.search.iterate import space_near
 from colloc.search.solve import solve
 from colloc.transcription.full_program import FullProgram

@@ -10,7 +10,7 @@ from colloc import Chain, Concertina, CrawlerBody, Friction, ModalBody, Viscous,
 from colloc.mechanics.fixed_point import motion_and_derivatives, solve_balance
 from colloc.results.motion import friction_arrows
 from colloc.smooth.balance import Motion, PanelGrid, curve, node_velocity, solve_smooth
-from colloc.smooth.crawler_body import LAP
+from colloc.smooth.smooth_body import LAP
 from tests.shared.cases import slow
 
 ANISOTROPIC = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)

@@ -28,8 +28,7 @@ from colloc.search.optimise import optimise
 from colloc.search.options import COARSE
 from colloc.search.solve import solve
 from colloc.smooth.balance import Motion
-from colloc.smooth.crawler_body import LAP
-from colloc.smooth.prescribed_body import schedule
+from colloc.smooth.smooth_body import LAP, schedule
 from scripts.continue_epsilon import Crawler, delta_for, epsilon_point, fitted_order
 from scripts.models.period import measured_period, period
 from tests.shared.cases import slow

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from colloc import Harmonic, Problem, ellipse
-from colloc.search.ipopt import Solver
+from colloc.search.confirm import Solver
 from colloc.system.interruption import clear_interrupt, interruptible, is_interrupted, time_limit
 from colloc.transcription.full_program import BalancedVelocity
 from tests.shared.stages import program_of

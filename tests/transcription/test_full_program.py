@@ -19,8 +19,8 @@ from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.bodies import FORMULATIONS
 from colloc.numerics.repeated import least_squares_multipliers, quasi_definite_factors
 from colloc.reduced.program import ReducedProgram
-from colloc.search import ipopt
-from colloc.search.ipopt import Solver, explanation
+from colloc.search import confirm
+from colloc.search.confirm import Solver, explanation
 from colloc.search.iterate import space_near
 from colloc.transcription.full_program import ACTUATORS, AT_LEAST, FullProgram
 from colloc.transcription.layout import RADIANS
@@ -240,7 +240,7 @@ def test_nonzeros_grow_by_so_many_for_every_interval(links, formulation, jacobia
 def test_ipopt_finds_from_the_guess_what_it_confirms():
     problem = stated("symmetric", gait=Harmonic(1, "bilateral"), intervals=12)
     full, x, *_ = at_guess(problem)
-    full, first = ipopt.solve_in_regions(full, x, 0.1, 0.5)
+    full, first = confirm.solve_in_regions(full, x, 0.1, 0.5)
     assert first.optimal
     again = Solver(full).solve_within(first.x, 0.1, (first.lam_x, first.lam_g), 0.01)
     assert again.optimal
@@ -329,7 +329,7 @@ def test_every_row_has_a_meaning_and_a_phase(changes):
     program = program_of(plain(**changes))
     phases = []
     for row in range(program.row_lower.size):
-        what, phase = ipopt.row_meaning(program, row)
+        what, phase = confirm.row_meaning(program, row)
         assert what.startswith(("the ", "closure", "contact", "where ", "a value "))
         phases.append(phase)
     assert 0 <= min(phases) <= max(phases) <= 1
