@@ -389,7 +389,7 @@ Study("s", (), lambda: PROBLEM) -> at least one Axis
 Study("s", [Axis("x", (1,)), Axis("x", (2,))], lambda x: PROBLEM) -> same name
 Study("a b", [Axis("x", (1,))], lambda x: PROBLEM) -> name must be
 Study("s", [Axis("x", (1,))], lambda x: PROBLEM, chunk=0) -> chunk must be
-Study("s", [Axis("x", (1,))], lambda x: PROBLEM, time_limit="long") -> must be positive
+Study("s", [Axis("x", (1,))], lambda x: PROBLEM, time_limit="long") -> time_limit must be a number
 Study("s", [Axis("x", (1,))], 3) -> must be a function
 Study("s", [Axis(name, range(1001)) for name in "xy"], lambda x, y: PROBLEM) -> 1000000 cells
 Axis("x", (1.0, None)) | Axis("x", ([1.0, 2.0],)) -> values of an axis must be numbers
