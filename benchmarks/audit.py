@@ -189,13 +189,12 @@ def random_gait(number: int) -> tuple[Chain, Friction, GaitPath]:
 
 def stated(body: Chain, friction: Friction, path: GaitPath) -> dict[str, tuple[float, float]]:
     """Value and error of each quantity, as a certificate states them."""
-    known = measure(body, friction, path, DELTA)
-    fine, limit = known.fine, known.value.limit
+    fine, known = measure(body, friction, path, DELTA)
     return {
-        "efficiency": (fine.efficiency, known.efficiency.error),
+        "efficiency": (fine.efficiency, known.efficiency_error),
         "distance": (fine.distance, known.errors["distance"]),
         "work": (fine.work, known.errors["work"]),
-        "limit": (limit.value, limit.error),
+        "limit": (known.value_at_zero_delta, known.value_error_at_zero_delta),
     }
 
 

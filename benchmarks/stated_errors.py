@@ -127,13 +127,13 @@ def slope(case: Case) -> Row:
 def certificate(case: Case) -> Row:
     """Measured as a certificate does."""
     level = case._replace(gait=Fourier(case.gait.mean, case.gait.cos, case.gait.sin))
-    known = measure(*level[:4], rotation=None, run=replayer(Regime(froude=case.froude)))
+    fine, known = measure(*level[:4], rotation=None, run=replayer(Regime(froude=case.froude)))
     played = GaitWithInertia(*level[:4], froude=case.froude, breaks=())
-    start = played.momenta(known.fine.tail_velocity(np.zeros(1)))
+    start = played.momenta(fine.tail_velocity(np.zeros(1)))
     return _row(
-        known.fine.values,
-        {**known.fine.errors, **known.errors},
-        _true_motion(level, start, _finer(known.fine.errors)),
+        fine.values,
+        {**fine.errors, **known.errors},
+        _true_motion(level, start, _finer(fine.errors)),
     )
 
 

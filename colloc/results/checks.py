@@ -163,18 +163,6 @@ class Limit(NamedTuple):
     error: float
 
 
-class Estimate(NamedTuple):
-    error: float
-    limit: Limit
-
-
-class Measured(NamedTuple):
-    fine: Replay
-    errors: dict[str, float]
-    value: Estimate
-    efficiency: Estimate
-
-
 def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limit:
     """Limit for delta -> 0 of one gait's value, from its values at delta, delta/10 and delta/100
     and their own errors, ``(3,)``.
@@ -204,9 +192,10 @@ def measure(
     instants: int = 1600,
     run: Callable[..., Replay] = replay,
     **how: Any,
-) -> Measured:
+) -> tuple[Replay, Certificate]:
     """Measure a path by replays at delta, delta/10 and delta/100, given the prescribed rotation;
-    other arguments are those of the replay `run`."""
+    other arguments are those of the replay `run`. The first replay, and a certificate without
+    checks."""
     replays: list[Replay] = []
     smoothed = friction.regularised or any(each.depends_on_delta for each in objective.integrals)
     for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
@@ -214,8 +203,11 @@ def measure(
         if replays:
             how |= {"near": replays[-1], "instants": max(2 * (instants // (2 * _FEWER)), 4)}
         replays.append(run(body, friction, path, part * delta, **how))
-    known = []
-    for aim in (objective, EFFICIENCY):
+    fine, numbers = replays[0], dict[str, Any]()
+    for name, of_limit, aim in (
+        ("value", "value_error_at_zero_delta", objective),
+        ("efficiency", "error_at_zero_delta", EFFICIENCY),
+    ):
         values, errors = [aim(each.values) for each in replays], list[float]()
         for value, each in zip(values, replays, strict=True):
             shift = {"distance": astray(each, rotation)}
@@ -223,11 +215,12 @@ def measure(
             error += float(aim.relative_error(each.values, shift))
             errors.append(abs(value) * (error + each.ambiguity_of(aim)))
         limit = extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])
-        known.append(Estimate(errors[0], limit))
-    fine = replays[0]
+        numbers[f"{name}_error"] = errors[0]
+        numbers[f"{name}_at_zero_delta"], numbers[of_limit] = limit
     stated = {name: fine.errors[name] + fine.others.get(name, 0.0) for name in ("distance", "work")}
     stated["distance"] += astray(fine, rotation)
-    return Measured(fine, stated, *known)
+    numbers |= {"value": fine.value, "instants": fine.instants}
+    return fine, Certificate(fine.values, stated, others={}, checks=(), **numbers)
 
 
 def astray(replayed: Replay, rotation: float | None) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -121,7 +122,7 @@ def gait_certificate(
     """The certificate of any gait, by its replay at three deltas, with further checks before and
     after: of a path of angles and rates, whose rates jump at phases `breaks`, and of a `claimed`
     value of the objective."""
-    result = measure(
+    fine, measured = measure(
         *(problem.body, problem.law, path, delta),
         tolerance=tolerance,
         instants=instants,
@@ -132,24 +133,11 @@ def gait_certificate(
         run=replayer(problem.regime),
         objective=problem.objective,
     )
-    fine, efficiency, value = result.fine, result.efficiency, result.value
     rows = [*before, *_rows(problem, path, fine, breaks, tolerance, claimed), *after]
-    influence = value.limit.value / fine.value - 1, problem.body.defaults.delta_influence
-    rows.append(("delta influence", *influence, "same gait at delta -> 0, relative change"))
-    return Certificate(
-        values=fine.values,
-        errors=result.errors,
-        others={},
-        checks=tuple(Check(*row) for row in rows),
-        instants=fine.instants,
-        efficiency_error=efficiency.error,
-        efficiency_at_zero_delta=efficiency.limit.value,
-        error_at_zero_delta=efficiency.limit.error,
-        value=fine.value,
-        value_error=value.error,
-        value_at_zero_delta=value.limit.value,
-        value_error_at_zero_delta=value.limit.error,
-    )
+    influence = measured.value_at_zero_delta / fine.value - 1
+    meaning = "same gait at delta -> 0, relative change"
+    rows.append(("delta influence", influence, problem.body.defaults.delta_influence, meaning))
+    return replace(measured, checks=tuple(Check(*row) for row in rows))
 
 
 def _rows(
