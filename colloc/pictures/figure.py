@@ -511,7 +511,7 @@ def _draw_tracks(axes: Axes, family: Steering) -> None:
         tracks += [(point, VERMILION, "s") for point in spot.points]
     t = np.linspace(0.0, _TRACK, _TRACK * _DOTS + 1)
     for point, colour, mark in tracks:
-        track = point.motion.sample(t).centre  # all arcs set out along +x
+        track = point.sample(t).centre  # all arcs set out along +x
         axes.plot(*track, color=colour, lw=1.0)
         axes.plot(*track[:, ::_DOTS], mark, color=colour, ms=3)
     what = f"x  [body lengths],  {_TRACK} cycles"

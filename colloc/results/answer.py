@@ -63,22 +63,64 @@ NOT_MEASURED = SecondOrder(np.nan, np.nan, 0, "nothing is free in a prescribed m
 
 
 @dataclass(frozen=True, eq=False)
-class CollocatedMotion:
-    """Motion of a collocated gait at any time, by the scheme's own interpolant."""
+class Answer:
+    """A gait as a point of the full direct-collocation program of its problem, with first-order
+    conditions in units of the friction, otherwise unscaled."""
 
-    problem: Problem
-    mesh: Mesh
-    layout: Layout
-    x: np.ndarray
+    problem: Problem  # as it was solved: the body on its panels, at the final delta
     gait: AnyGait
-    delta: float
+    delta: float  # in the units of the problem's class of gaits
+    edges: np.ndarray  # of the mesh, in phases of the gait, (n_interval + 1,)
+    scheme: str
+    x: np.ndarray  # variables of the motion (`colloc.transcription.layout`), (n,)
+    lam_x: np.ndarray  # multipliers of their bounds, (n,)
+    lam_g: np.ndarray  # multipliers of the constraints, (m,)
+    value: float  # of the objective, as collocation sees it, like distance and work of a period
+    distance: float
+    work: float
+    kkt_error: float
+    violation: float
+    complementarity: float
+    status: str
+    optimal: bool  # whether the first-order conditions hold
+    iterations: int
+    seconds: float
+    program: str = REDUCED  # where the conditions were measured; else the problem's formulation
+    second_order: SecondOrder = NOT_MEASURED
+    message: str = ""  # what does not hold, or holds in a way that should be told
+    history: tuple[Step, ...] = ()  # how the search came here; the last step is the answer itself
 
     def __repr__(self) -> str:
-        name = self.problem.name
-        return f"<CollocatedMotion of {name}: sample(t), or Solution.to_xarray with units>"
+        verdict = "" if self.optimal else f", {self.status}"
+        size, at = f"{self.x.size} variables", f"delta = {self.delta:.1e}"
+        return f"<Answer at {at}: {self.value:.6g}, {self.program}, {size}{verdict}>"
 
+    @property
+    def efficiency(self) -> float:
+        """Distance over work, as collocation sees them."""
+        return self.distance / self.work
+
+    @property
+    def step(self) -> Step:
+        names = [each.name for each in fields(Step) if each.name != "intervals"]
+        return Step(intervals=self.edges.size - 1, **{name: getattr(self, name) for name in names})
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        return Mesh(scheme(self.scheme), self.edges)
+
+    @cached_property
+    def layout(self) -> Layout:
+        return layout_of(control_problem(self.problem), self.mesh)
+
+    @cached_property
+    def delta_per_period(self) -> float:
+        """Regularisation speed [body lengths per period]."""
+        return delta_per_period(self.problem.gait, self.gait, self.delta)
+
+    # its motion at any time, by the scheme's own interpolant
     def sliding(self, angles: np.ndarray, rates: np.ndarray, z: np.ndarray) -> Sliding:
-        delta = np.full((1, z.shape[1]), self.delta)
+        delta = np.full((1, z.shape[1]), self.delta_per_period)
         return self.problem.body.sliding(self.problem.law, angles, rates, z, delta)
 
     @cached_property
@@ -153,69 +195,6 @@ class CollocatedMotion:
         theta, centre = theta + before.rotation, before.of(centre)
         tail = centre - rotate(body.centre(angles), theta)
         return SampledMotion(t, angles, rates, z, theta, centre, tail)
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """A gait as a point of the full direct-collocation program of its problem, with first-order
-    conditions in units of the friction, otherwise unscaled."""
-
-    problem: Problem  # as it was solved: the body on its panels, at the final delta
-    gait: AnyGait
-    delta: float  # in the units of the problem's class of gaits
-    edges: np.ndarray  # of the mesh, in phases of the gait, (n_interval + 1,)
-    scheme: str
-    x: np.ndarray  # variables of the motion (`colloc.transcription.layout`), (n,)
-    lam_x: np.ndarray  # multipliers of their bounds, (n,)
-    lam_g: np.ndarray  # multipliers of the constraints, (m,)
-    value: float  # of the objective, as collocation sees it, like distance and work of a period
-    distance: float
-    work: float
-    kkt_error: float
-    violation: float
-    complementarity: float
-    status: str
-    optimal: bool  # whether the first-order conditions hold
-    iterations: int
-    seconds: float
-    program: str = REDUCED  # where the conditions were measured; else the problem's formulation
-    second_order: SecondOrder = NOT_MEASURED
-    message: str = ""  # what does not hold, or holds in a way that should be told
-    history: tuple[Step, ...] = ()  # how the search came here; the last step is the answer itself
-
-    def __repr__(self) -> str:
-        verdict = "" if self.optimal else f", {self.status}"
-        size, at = f"{self.x.size} variables", f"delta = {self.delta:.1e}"
-        return f"<Answer at {at}: {self.value:.6g}, {self.program}, {size}{verdict}>"
-
-    @property
-    def efficiency(self) -> float:
-        """Distance over work, as collocation sees them."""
-        return self.distance / self.work
-
-    @property
-    def step(self) -> Step:
-        names = [each.name for each in fields(Step) if each.name != "intervals"]
-        return Step(intervals=self.edges.size - 1, **{name: getattr(self, name) for name in names})
-
-    @property
-    def mesh(self) -> Mesh:
-        return Mesh(scheme(self.scheme), self.edges)
-
-    @property
-    def layout(self) -> Layout:
-        return layout_of(control_problem(self.problem), self.mesh)
-
-    @property
-    def delta_per_period(self) -> float:
-        """Regularisation speed [body lengths per period]."""
-        return delta_per_period(self.problem.gait, self.gait, self.delta)
-
-    @cached_property
-    def motion(self) -> CollocatedMotion:
-        return CollocatedMotion(
-            self.problem, self.mesh, self.layout, self.x, self.gait, self.delta_per_period
-        )
 
 
 @dataclass(frozen=True, eq=False)

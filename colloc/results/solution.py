@@ -152,18 +152,15 @@ class Solution:
     work = property(
         attrgetter("measured.work"), doc="Work over a cycle, by replay if there was one."
     )
+    rotation = property(
+        attrgetter("measured.rotation"),
+        doc="Net rotation over a cycle [rad], counter-clockwise, by replay if there was one.",
+    )
     mesh = property(attrgetter("answer.mesh"), doc="Mesh of the collocation, in phases.")
-    motion = property(attrgetter("answer.motion"), doc="The motion, as collocated.")
     delta_per_period = property(
         attrgetter("answer.delta_per_period"),
         doc="Regularisation speed [body lengths per period].",
     )
-
-    @property
-    def rotation(self) -> float:
-        """Net rotation over a cycle [rad], counter-clockwise: of the replay if there was one, else
-        as collocated."""
-        return self.certificate.rotation if self.certificate.replayed else self.motion.rotation
 
     @property
     def arc(self) -> Arc:
@@ -171,7 +168,7 @@ class Solution:
         turn is asked for."""
         if self.problem.rotation is not None:
             return Arc(self.problem.rotation, self.distance)
-        return arc(self.rotation, self.motion.sample(PHASES).centre)
+        return arc(self.rotation, self.answer.sample(PHASES).centre)
 
     @property
     def turning_radius(self) -> float:
@@ -269,8 +266,8 @@ class Solution:
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
         """The motion at phases t, any real numbers, period after period:
-        `CollocatedMotion.sample`."""
-        return self.motion.sample(t)
+        `Answer.sample`."""
+        return self.answer.sample(t)
 
     @property
     def froude(self) -> float:
@@ -338,7 +335,7 @@ class Solution:
 
     def power(self, motion: SampledMotion) -> np.ndarray:
         """Power against friction at the instants of a motion, ``(n_time,)``."""
-        return self.motion.sliding(motion.angles, motion.rates, motion.z).power[0]
+        return self.answer.sliding(motion.angles, motion.rates, motion.z).power[0]
 
     def plot(self, ax: Any = None, panel: str = "gait") -> Any:
         """The figure of `colloc solve`, as a matplotlib Figure: notebooks show it,

@@ -27,7 +27,7 @@ def is_trivial(answer: Answer) -> bool:
     problem = answer.problem
     if problem.regime.slides:
         return answer.value / control_problem(problem).unscale(1.0) < TOLERANCES.zero_value
-    return goes_nowhere(answer) and not abs(answer.motion.rotation) > TOLERANCES.angle
+    return goes_nowhere(answer) and not abs(answer.rotation) > TOLERANCES.angle
 
 
 def goes_nowhere(answer: Answer) -> bool:
@@ -71,7 +71,7 @@ def certify(answer: Answer, *, tolerance: float = 1e-6, instants: int | None = N
         instants = max(usual.instants, 2 * int(np.ceil(each * answer.mesh.n_point)))
     before, after, speed = list[Row](), list[Row](), answer.delta_per_period
     if answer.program != EVALUATED:
-        residual = float(np.abs(answer.motion.at_points.force).max() / problem.law.largest)
+        residual = float(np.abs(answer.at_points.force).max() / problem.law.largest)
         gradient, second = max(answer.kkt_error, answer.complementarity), answer.second_order
         value = max(-second.smallest - second.error, 0.0)
         curvature = f"smallest curvature {second.smallest:.1e}"

@@ -130,7 +130,7 @@ def evaluate(
             f"smallest_shape_speed {least:g}, where friction is viscous."
         )
     answer = on_fine_mesh(stated, driven)
-    turned = answer.motion.rotation
+    turned = answer.rotation
     if abs(turned) < TOLERANCES.replay_gap * answer.distance:
         if not problem.uses("rotation"):  # which then may be anything
             stated = stated.with_(rotation=0.0)
@@ -544,7 +544,7 @@ class _Fit:
 
     def off(self, x: np.ndarray, motors: Fourier | None = None) -> np.ndarray:
         problem, gait = with_motors(self.with_(x), motors or self.gait)
-        motion = on_mesh(problem, gait, self.mesh).motion.sample(self.phases)
+        motion = on_mesh(problem, gait, self.mesh).sample(self.phases)
         centre, outline = (
             x + 1j * y for x, y in (motion.centre, lab_outline(problem.body, motion))
         )

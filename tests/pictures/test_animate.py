@@ -98,7 +98,7 @@ def test_friction_turns_with_a_body_that_turns_cycle_by_cycle(monkeypatch):
     assert len(list(pictures(turning, 2, 2, width=200))) == 4
     assert abs(turning.rotation) > 0.1
     first, then = np.split(np.array(drawn[-4:]), 2)
-    np.testing.assert_allclose(then, np.exp(1j * turning.motion.rotation) * first, atol=1e-9)
+    np.testing.assert_allclose(then, np.exp(1j * turning.answer.rotation) * first, atol=1e-9)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")

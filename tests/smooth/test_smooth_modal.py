@@ -201,4 +201,4 @@ def test_a_gait_on_more_panels_is_replayed_and_kept(tmp_path):
     assert abs(solution.efficiency / again.efficiency - 1) < 1e-4
     read = load(save(solution, tmp_path / "two.h5"))
     assert read.answer.problem.body == solution.answer.problem.body != read.problem.body
-    assert np.abs(read.motion.at_points.force).max() < 1e-6
+    assert np.abs(read.answer.at_points.force).max() < 1e-6
