@@ -98,34 +98,10 @@ def gait_from(stated: dict[str, Any]) -> AnyGait:
     return part_from(GAITS, stated)
 
 
-def problem_fields(problem: Any) -> dict[str, Any]:
-    """All fields of a problem; those `STATED_IF_SET` only if they are not the default."""
-    plain: dict[str, Any] = {
-        name: fields(getattr(problem, name)) for name in ("guess", "body", "friction")
-    }
-    plain |= {
-        "gait": fields(problem.gait),
-        "objective": problem.objective.fields(),
-        "at_least": [[aim.fields(), least] for aim, least in problem.at_least],
-        "limits": [limit.fields() for limit in problem.limits],
-    }
-    if problem.motion is not None:
-        plain["motion"] = fields(problem.motion)
-    if problem.robot is not None:
-        plain["robot"] = fields(problem.robot)
-    return {
-        f.name: plain.get(f.name, value)
-        for f in dataclasses.fields(problem)
-        if f.name not in problem.derived_fields
-        and ((value := getattr(problem, f.name)) != f.default or f.metadata != STATED_IF_SET)
-    }
-
-
-def problem_arguments(stated: dict[str, Any]) -> dict[str, Any]:
-    kinds = {"guess": GAITS, "body": BODIES, "friction": [*LAWS, FeetLaw], "gait": CLASSES}
-    kinds |= {"motion": MOTIONS} if "motion" in stated else {}
-    kinds |= {"robot": [Robot]} if "robot" in stated else {}
-    return stated | {name: part_from(kind, stated[name]) for name, kind in kinds.items()}
+def kinds_of_parts() -> dict[str, list[type]]:
+    """Kinds of the parts of a problem, by the names of its fields."""
+    usual = {"guess": GAITS, "body": BODIES, "friction": [*LAWS, FeetLaw], "gait": CLASSES}
+    return usual | {"motion": MOTIONS, "robot": [Robot]}
 
 
 def statement_hash(stated: Any) -> str:

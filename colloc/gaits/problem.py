@@ -530,8 +530,24 @@ class Problem:
         return self.with_(robot=None, **values)
 
     def to_dict(self) -> dict:
-        """All fields as plain numbers, strings and lists (JSON)."""
-        return gait_fields.problem_fields(self)
+        """All fields as plain numbers, strings and lists (JSON); those `STATED_IF_SET` only if they
+        are not the default."""
+        plain: dict[str, Any] = {
+            name: gait_fields.fields(part)
+            for name in gait_fields.kinds_of_parts()
+            if (part := getattr(self, name)) is not None
+        }
+        plain |= {
+            "objective": self.objective.fields(),
+            "at_least": [[aim.fields(), least] for aim, least in self.at_least],
+            "limits": [limit.fields() for limit in self.limits],
+        }
+        return {
+            f.name: plain.get(f.name, value)
+            for f in dataclasses.fields(self)
+            if f.name not in self.derived_fields
+            and ((value := getattr(self, f.name)) != f.default or f.metadata != STATED_IF_SET)
+        }
 
     @classmethod
     def from_dict(cls, stated: dict) -> Problem:
@@ -543,7 +559,12 @@ class Problem:
             If a field is missing, unknown or has an unusable value.
         """
         try:
-            return cls(**gait_fields.problem_arguments(stated))
+            parts = {
+                name: gait_fields.part_from(kinds, stated[name])
+                for name, kinds in gait_fields.kinds_of_parts().items()
+                if name in stated or name not in ("motion", "robot")
+            }
+            return cls(**stated | parts)
         except ProblemError:
             raise
         except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
