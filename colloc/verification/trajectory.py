@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.system.arguments import check_finite, shown
+from colloc.gaits.limits import checked_actuator_limit, of_each
+from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 from colloc.verification.adaptive_motion import Path
 
@@ -141,14 +142,5 @@ def _slowest(vertices: np.ndarray, limits: np.ndarray, keep_pace: bool) -> np.nd
 
 def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: str) -> np.ndarray:
     """Positive limits ``(n_joint,)`` from one for all or one each."""
-    try:
-        given = np.asarray(limits, dtype=float).ravel()
-    except (TypeError, ValueError):
-        raise ProblemError(f"{what}s must be numbers, not {shown(limits)}.") from None
-    if given.size not in (1, n_joint):
-        raise ProblemError(
-            f"{given.size} {what}s for {n_joint} joints; give one for all, or one each."
-        )
-    if not np.isfinite(given).all() or given.min() <= 0:
-        raise ProblemError(f"{what}s must be positive, not {given.tolist()}.")
-    return np.broadcast_to(given, n_joint)
+    stated = np.ravel(limits)[0] if np.size(limits) == 1 else limits
+    return np.array(of_each(checked_actuator_limit(what, stated, n_joint), n_joint))
