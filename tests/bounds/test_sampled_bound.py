@@ -284,6 +284,9 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     tiny = Budget(intervals=3, harmonics=(1,), shapes=6, directions=6, rounds=1, starts=10)
     cache = tmp_path / "bounds.sqlite"
     first = efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache)
+    steep = efficiency_bound(Chain(), Friction(mu_t=9.0), 2.0, budget=tiny)
+    assert "no convex potential" in steep.report(0.1)
+    assert steep.floor < steep.sampled
     monkeypatch.setattr("colloc.bounds.sampled.compute_bound", None)
     assert efficiency_bound(Chain(), Friction(), 2.0, budget=tiny, cache=cache) == first
     assert "gap 0.1000" in first.report(first.sampled - 0.1)

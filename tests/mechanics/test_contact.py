@@ -397,3 +397,11 @@ def test_two_links_cannot_gain_by_any_delta_or_harmonics_what_directional_fricti
     assert abs(sweep[np.argmax(values)] - abs(solution.gait.cos[0, 0])) < 0.15
     assert solution.certificate.efficiency == pytest.approx(max(values), rel=5e-3)
     assert solution.certificate.efficiency >= max(values) * (1 - 1e-6)
+
+
+def test_wide_links_that_lie_end_to_end_overlap_by_what_they_lack():
+    """Links 2 and 3 fold up, so that link 4 begins 0.02 beyond the end of link 1."""
+    body = Chain((0.4, 0.11, 0.09, 0.4))
+    ends = np.stack(body.joints(np.array([[0.0], [np.pi], [np.pi]])))
+    assert overlapping_pairs(ends, ((0, 3),), 0.03, 0.0) == ((0, 3),)
+    assert overlapping_pairs(ends, ((0, 3),), 0.01, 0.0) == ()

@@ -141,17 +141,6 @@ def test_everything_from_the_file_is_escaped(three_link):
     assert "<script" not in card
 
 
-def test_the_page_says_how_slow_is_slow_enough(page, three_link):
-    """On a floor with a part of the friction at that part of the Froude number, L/(gT²)."""
-    words = (
-        r"up to a Froude number L/\(gT²\) of (\S+): a robot of 1 m on a\s+floor with (\S+) of "
-        r"this friction, from (\S+) s"
-    )
-    froude, part, period = map(float, re.search(words, unescape(page)).groups())
-    assert froude == pytest.approx(three_link.slow_enough(0.01), rel=0.05)
-    assert 1 / (9.81 * period**2) == pytest.approx(part * froude, rel=0.15)  # of two digits
-
-
 @pytest.mark.parametrize("n_link", slow_but([2, 3], [2, 3, 5, 8]))
 def test_chains_of_two_to_eight_links(n_link, unsolved):
     solution = unsolved(crawler(n_link))
@@ -271,9 +260,6 @@ def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
 
 def test_a_notebook_shows_a_card_with_a_film_of_two_periods(three_link):
     page = three_link._repr_html_()
-    text = " ".join(outline(page).text)
-    for words in ("three_link", "solved", "0.26003", "checks, all hold", "distance d"):
-        assert words in text
     film = re.search(r'points" values="([^"]+)"', page)[1].split(";")
     # (time, point, 2) [pixels]
     drawn = np.array([[p.split(",") for p in frame.split()] for frame in film], dtype=float)

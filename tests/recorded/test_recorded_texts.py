@@ -26,9 +26,13 @@ from matplotlib.figure import Figure
 from colloc import Objective, save
 from colloc.commands.main import main
 from colloc.commands.solve import summary_lines
+from colloc.gaits.parameters import parameters
+from colloc.pictures.movie import pictures
 from colloc.pictures.report_page import report_page
+from colloc.results.answer import SecondOrder
 from colloc.results.archive import StartName
-from colloc.studies.families import Gap, ParetoFront, Steering
+from colloc.search.certify import certify
+from colloc.studies.families import Gap, ParetoFront, Steering, read_front
 from tests.recorded.states import LOOP, MADE, STATED, state
 from tests.shared.store_samples import archive, outcome
 
@@ -88,6 +92,45 @@ def represent(*names):
 
 
 @also
+def describe(*names):
+    each = (x for name in names for x in (state(name).problem.law, state(name).problem.body))
+    return "\n".join(x.describe() for x in each)
+
+
+@also
+def numbers(*names):
+    """Those of which a problem has sensitivities."""
+    every = (x for name in names for x in parameters(state(name).problem))
+    return ", ".join(f"{x.name} {x.value:.4g}" for x in every)
+
+
+@also
+def curvature(*stated):
+    """The check of such a curvature, its error and so many free directions."""
+    smallest, error, n_free = map(float, stated)
+    found = SecondOrder(smallest, error, int(n_free))
+    answer = replace(state("swimmer").answer, program="reduced", second_order=found)
+    return next(x.line() for x in certify(answer).checks if x.name == "second order")
+
+
+@also
+def film(name, beside=None):
+    """What the fourth picture of a film says and draws."""
+    made = []
+
+    def kept(**how):
+        made.append(Figure(**how))
+        return made[-1]
+
+    other = beside and state(beside)
+    with patch("colloc.pictures.movie.Figure", kept):
+        drawn = pictures(state(name), 5, 2, width=400, beside=other)
+        for _ in range(4):
+            next(drawn)
+    return described(made[0])
+
+
+@also
 def page(name, lines=None):
     """Words of the report, or so many lines of them, but for the drawings."""
     words = words_of(report_page(state(name), gap="  upper bound 1")).splitlines()
@@ -100,6 +143,7 @@ def card(name):
 
 
 def words_of(page):
+    page = re.sub(r'<input [^>]*(min="[^"]*" max="[^"]*")[^>]*>', r"\1", page)
     page = re.sub(r"(?s)<(style|script|svg).*?</\1>", "", page)
     return re.sub(r"\s*\n\s*", "\n", re.sub(r"(<[^>]*>\s*)+", "\n", page))
 
@@ -110,6 +154,11 @@ def draw(name, panel=None):
     if panel is None:
         return described(solution.plot())
     return described(solution.plot(Figure().add_subplot(), panel).figure)
+
+
+@also
+def sheet(name):
+    return described(state(name).robot().plot())
 
 
 def described(figure):
@@ -153,7 +202,8 @@ def pareto():
     front = ParetoFront(ends[0].problem, aims, ends, gaps)
     with patch("colloc.studies.families.pareto_front", return_value=front):
         colloc("pareto", "loop.py", "--no-figure")
-    return f"{front!r}\n{front.narrow}\n{described(front.plot())}"
+    again = read_front(Path("results/loop.front.csv"), front.problem)
+    return f"{front!r}\n{again!r}\n{again.gaps}\n{described(front.plot())}"
 
 
 @also

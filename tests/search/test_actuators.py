@@ -15,8 +15,10 @@ from colloc.mechanics.contact import crossing_depth
 from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque_and_power
 from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.inertia import inertial_moments
+from colloc.reduced.program import ReducedProgram
 from colloc.results.limit_use import lines
 from colloc.results.robot import joint_torques as sheet_torques
+from colloc.search.iterate import space_near
 from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
 from colloc.transcription.full_program import ACTUATORS
@@ -469,3 +471,15 @@ def test_with_slow_joints_it_is_the_maximum_over_ellipses_that_are_small_enough(
     assert centre[1] == 1.0
     value = efficiencies(ellipses[[best]], 960)[0]
     assert solution.certificate.efficiency == pytest.approx(value, rel=1e-4)
+
+
+def test_between_points_of_a_mesh_less_is_allowed_to_both_sides():
+    limits = {"torque_limit": 0.05, "power_limit": 1.0}  # joints brake with any power
+    stated = USUAL.with_(guess=colloc.ellipse(0.0, 2.0, 1.3), intervals=8, delta=1e-3, **limits)
+    space, v = space_near(stated, stated.guess)
+    program = ReducedProgram(space, stated.delta)
+    program.place_rows(v)
+    placed = program.actuators
+    assert placed.upper.min() < 0.95
+    np.testing.assert_array_equal(placed.lower[:2], -placed.upper[:2])
+    assert np.isinf(placed.lower[2:]).all()

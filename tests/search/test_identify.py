@@ -69,6 +69,12 @@ def test_known_coefficients_lie_within_the_errors_nineteen_times_in_twenty(crawl
     assert 0.4 < np.sqrt(np.mean(np.square(off))) < 0.6  # of 24 numbers it is known to 15 %
 
 
+def test_noise_of_places_that_lasts_tells_less(crawled, tmp_path):
+    paths = (recorded(tmp_path / f"{n}.csv", crawled, lasts=n) for n in (1, 8))
+    once, long = (colloc.identify(FLOOR, path).coefficients["mu_t"][1] for path in paths)
+    assert long > 2 * once
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("point", ["head_", "tail_"])
 def test_any_point_of_the_body_and_its_direction_will_do_in_metres_too(crawled, tmp_path, point):

@@ -17,6 +17,7 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait_fields import statement_hash
 from colloc.gaits.objective import DRIVEN, EFFICIENCY, NAMED, QUANTITIES, SPEED, TURNING
 from colloc.reduced.program import ReducedProgram
+from colloc.search.explore import with_reachable_distance
 from colloc.search.iterate import space_near
 from colloc.search.solve import solve
 from tests.shared.mechanics import coulomb
@@ -312,3 +313,10 @@ def test_a_problem_with_an_objective_comes_back_from_its_statement():
 def test_the_error_of_a_value_is_relative_to_its_magnitude_whatever_its_sign(expression):
     period = {"distance": 0.4, "work": 2.0, "rotation": -0.3, "length": 7.0, "driven_work": 2.0}
     assert Objective(expression).relative_error(period, {"work": 0.1}) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(("asked", "least"), [(0.3, 0.1), (0.15, 0.15)])
+def test_of_a_distance_that_no_gait_goes_half_of_the_farthest_is_asked(asked, least, monkeypatch):
+    monkeypatch.setattr("colloc.search.explore.farthest_distance", lambda problem: 0.2)
+    stated = with_reachable_distance(Problem("far", least_distance=asked)).at_least
+    assert [(aim.name, level) for aim, level in stated] == [("distance", least)]
