@@ -132,23 +132,6 @@ def test_a_body_that_turns_and_moves_steadily_goes_round_a_circle(name):
     np.testing.assert_allclose(found.place, v * (np.exp(1j * w * fine) - 1) / (1j * w), atol=1e-6)
 
 
-def rate(t):
-    return 1.5 * np.cos(2 * t) - 0.4
-
-
-def forward(t):
-    return (0.5 + t) * np.exp(0.7j * t)
-
-
-@pytest.mark.parametrize(("name", "order"), [("gauss-2", 4), ("radau-2", 3), ("trapezoid", 2)])
-def test_the_place_converges_with_the_order_of_the_scheme(name, order):
-    exact = pose("gauss-5", np.linspace(0, 1, 200), rate, forward).place[-1]
-    coarse, fine = (
-        abs(pose(name, np.linspace(0, 1, n + 1), rate, forward).place[-1] - exact) for n in (8, 16)
-    )
-    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.3)
-
-
 def test_a_gait_goes_where_its_whole_period_leads():
     """The second half of an antipodal gait mirrors the first, from where that ended."""
     displacement, rotation = 0.3 * np.exp(0.9j), 0.5

@@ -93,12 +93,6 @@ def test_beside_a_fold_of_the_balance_the_other_solution_is_found_in_few_steps(c
     assert max(first.iterations.max(), found.iterations.max()) <= 40 * body.n_link
 
 
-def test_no_load_is_a_load_of_nothing():
-    at = LOPSIDED, UNEQUAL, *random_instants(50), 1e-4
-    plain, loaded = (solve_balance(*at, load=load).z for load in (None, np.zeros((2, 50))))
-    np.testing.assert_array_equal(plain, loaded)
-
-
 def test_a_body_whose_joints_rest_creeps_as_friction_on_a_point_says():
     """Then all points move alike: mu v/sqrt(v^2 + delta^2) is the load, whatever the shape."""
     angles, delta = random_instants(8)[0], 1e-4

@@ -228,10 +228,6 @@ def test_a_narrow_side_is_found_that_chance_misses():
     assert around(wide, ZERO, points=2).kkt_error == pytest.approx(0.05, rel=1e-3)
 
 
-def test_they_do_not_cancel_on_a_slope_with_a_kink():
-    assert around(Pieces([(1, 1), (-1, 1)]), ZERO).kkt_error == pytest.approx(1, abs=1e-5)
-
-
 def test_a_row_that_binds_carries_what_is_left_along_it():
     valley, slope = (Pieces(each, total=0.0) for each in ([(2, 0), (-1, 1)], [(1, 0), (2, -1)]))
     assert stationarity(valley, ZERO).kkt_error == pytest.approx(1)
@@ -239,7 +235,8 @@ def test_a_row_that_binds_carries_what_is_left_along_it():
     assert around(slope, ZERO).kkt_error == pytest.approx(0.5, abs=1e-5)
 
 
-def test_a_ridge_has_the_same_gradients_and_is_no_minimum():
+def test_on_a_slope_with_a_kink_they_do_not_cancel_and_on_a_ridge_that_is_no_minimum():
+    assert around(Pieces([(1, 1), (-1, 1)]), ZERO).kkt_error == pytest.approx(1, abs=1e-5)
     at = stationarity(ridge := Pieces([(1, 0), (-1, 0)], sign=-1.0), ZERO)
     assert stationarity_around(ridge, ZERO, at, 1e-6, enough=1e-9) is at
 

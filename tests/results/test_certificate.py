@@ -140,6 +140,16 @@ def test_joint_limits_are_those_of_the_problem(failures, three_link):
     judged("joint limits", run)
 
 
+def test_joint_speeds_are_those_of_the_problem(failures, three_link):
+    fastest = np.abs(three_link.gait.rates(np.linspace(0, 1, 20001))).max()
+
+    def run(f):
+        tight = three_link.problem.with_(speed_limit=fastest / (1 + f * 1e-4))
+        return failures(with_answer(three_link, problem=tight))
+
+    judged("joint speed", run)
+
+
 def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(
     failures, three_link, replays
 ):

@@ -223,7 +223,7 @@ def test_a_path_of_another_body_is_not_explained(crawled, tmp_path):
 
 
 def test_the_command_prints_what_to_write_into_the_problem_file(crawled, tmp_path, capsys):
-    recorded(tmp_path / "a.csv", crawled)
+    recorded(tmp_path / "a.csv", crawled, per_period=40)
     problem = tmp_path / "floor.py"
     problem.write_text(
         "from colloc import *\nPROBLEM = Problem('floor', delta=1e-2, mesh_tolerance=1e-3)\n"

@@ -7,7 +7,6 @@ import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-import h5py
 import numpy as np
 import pytest
 from shared.store_samples import GAIT
@@ -294,23 +293,6 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     assert "holds starts of another problem" in complaint
     path.write_text(FILE, encoding="utf-8")
     assert len(kept().outcomes) == 6
-
-
-def test_of_two_runs_at_once_with_other_seeds_or_problems_neither_overwrites_the_other(tmp_path):
-    path = tmp_path / "a.h5"
-    runs = [open_archive(problem(), path) for _ in (0, 1)]
-    for k in range(3):
-        for seed, archive in enumerate(runs):
-            archive.add({name(k, seed): outcome(k, efficiency=0.1 * (seed + 1))})
-    assert len(runs[0].outcomes) == 3
-    save_archive(runs[0])
-    expected = {name(k, seed): 0.1 * (seed + 1) for seed in (0, 1) for k in range(3)}
-    assert {key: o.efficiency for key, o in runs[0].outcomes.items()} == expected
-    with h5py.File(path) as file:
-        assert file["start"].size == 6
-    with pytest.raises(StoreError, match="another problem"):
-        open_archive(problem(delta=0.2), path)
-    assert len(open_archive(problem(), path).outcomes) == 6
 
 
 class _Enough(Exception):

@@ -35,12 +35,9 @@ def press(times=1, **options):
     return seen["pressed"], seen["known"]
 
 
-def test_a_block_that_asks_is_left_to_stop_by_itself_and_interrupted_at_its_end():
+def test_a_block_that_asks_stops_by_itself_or_at_its_end_and_at_a_second_ctrl_c_at_once():
     assert press() == (1, True)
     assert press() == (1, True)  # a new block begins anew
-
-
-def test_a_second_ctrl_c_is_raised_at_once():
     assert press(times=3) == (2, False)
 
 

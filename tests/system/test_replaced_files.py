@@ -78,18 +78,25 @@ def in_child(function, *arguments):
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
-@contextlib.contextmanager
-def open_to_others(folder, root):
-    """Others may pass through pytest's own folders: those from `folder` up to, and without, the
-    system's temporary folder."""
+def in_child_that_cannot_write(folder, root, function):
+    """The same of one who may not write into the folder, but pass through pytest's own: those up
+    to, and without, the system's temporary folder."""
     temporary = Path(tempfile.gettempdir())
     top = temporary if root.is_relative_to(temporary) else root.parent
-    inside = [p for p in (folder, *folder.parents) if p.is_relative_to(top) and p != top]
+    inside = [p for p in folder.parents if p.is_relative_to(top) and p != top]
     before = {p: p.stat().st_mode for p in inside}
+
+    def powerless():
+        if os.geteuid() == 0:
+            os.setuid(65534)  # nobody: permissions do not stop the superuser
+        else:
+            os.chmod(folder, 0o555)
+        return function()
+
     try:
         for p, mode in before.items():
             p.chmod(mode | 0o011)
-        yield
+        return in_child(powerless)
     finally:
         for p, mode in before.items():
             p.chmod(mode)
@@ -104,10 +111,6 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
     (tmp_path / "s.py").write_text(STUDY)
 
     def attempt():
-        if os.geteuid() == 0:
-            os.setuid(65534)  # nobody: permissions do not stop the superuser
-        else:
-            os.chmod(folder, 0o555)
         refused = 0
         for kind in KINDS:
             samples.folder = folder
@@ -119,8 +122,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
                 refused += "cannot write" in str(error) and str(folder) in str(error)
         return 10 * (refused == len(KINDS))
 
-    with open_to_others(tmp_path, tmp_path_factory.getbasetemp()):
-        assert in_child(attempt) == 10
+    assert in_child_that_cannot_write(folder, tmp_path_factory.getbasetemp(), attempt) == 10
     assert list(folder.iterdir()) == []
     assert Path(tempfile.gettempdir()).stat().st_mode == temporary
 
@@ -133,17 +135,12 @@ def test_an_archive_is_read_where_nothing_can_be_written(tmp_path, tmp_path_fact
     before = sorted(p.name for p in folder.iterdir())
 
     def shown():
-        if os.geteuid() == 0:
-            os.setuid(65534)
-        else:
-            os.chmod(folder, 0o555)
         said = io.StringIO()
         with contextlib.redirect_stdout(said):
             code = show_archive([str(folder / "a.h5")])
         return 10 * (code == 0) + ("4 starts: 4 solved" in said.getvalue())
 
-    with open_to_others(tmp_path, tmp_path_factory.getbasetemp()):
-        assert in_child(shown) == 11
+    assert in_child_that_cannot_write(folder, tmp_path_factory.getbasetemp(), shown) == 11
     assert sorted(p.name for p in folder.iterdir()) == before
     assert len(archive_at(folder / "a.h5").outcomes) == 4
 

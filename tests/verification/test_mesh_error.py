@@ -107,16 +107,6 @@ def test_shares_of_intervals_add_up_where_the_body_turns_in_half_a_period():
     assert error.value.sum() == pytest.approx(error.total, rel=0.02)
 
 
-def test_errors_of_a_smooth_motion_fall_with_the_order_of_the_scheme():
-    # at delta = 10, faster than all links, friction is viscous and the motion smooth
-    stated = problem(delta=10.0, delta_start=10.0)
-    for name, order in (("gauss-2", 4), ("radau-2", 3), ("gauss-3", 6)):
-        meshes = (Mesh(scheme(name), np.linspace(0, 0.5, n + 1)) for n in (20, 40))
-        errors = (error_of(stated, mesh, tolerance=1e-11, delta=10.0) for mesh in meshes)
-        coarse, fine = (np.abs(error.value).sum() for error in errors)
-        assert np.log2(coarse / fine) == pytest.approx(order, abs=0.5)
-
-
 @each_friction
 def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     stated = problem(friction=friction)
