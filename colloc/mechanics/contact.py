@@ -266,10 +266,12 @@ def crossing_depth(
     if not is_chain(body):
         return np.zeros(angles.shape[1])
     ends = np.stack(body.joints(angles))
-    if pairs is None:
-        near = _within_reach(ends, _pairs_apart(body.n_link, 2))
-        return _overlap(ends, near, body.width, ends_and_links(body))
-    return _overlap(ends, pairs, body.width)
+    near = _within_reach(ends, _pairs_apart(body.n_link, 2)) if pairs is None else list(pairs)
+    depth = _crossing(ends, near).max(axis=0, initial=0.0)
+    if body.width == 0:
+        return depth
+    beside = ends_and_links(body) if pairs is None else _ends_beside(near).reshape(-1, 2)
+    return _with_width(depth, _gaps(ends, beside).min(axis=0, initial=np.inf), body.width)
 
 
 def passing_depth(body: Any, angles: np.ndarray) -> float:
@@ -283,57 +285,71 @@ def passing_depth(body: Any, angles: np.ndarray) -> float:
     if not is_chain(body):
         return 0.0
     ends = np.stack(body.joints(angles))
-    return _passing(ends, _within_reach(ends, _pairs_apart(body.n_link, 2)))
+    near = _within_reach(ends, _pairs_apart(body.n_link, 2))
+    return float(_passing(ends, near).max(initial=0.0))
 
 
 def overlapping_pairs(ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float) -> Pairs:
     """Pairs of links that overlap, or pass through each other along a path, by more than `least`
     [body lengths]; from the coordinates ``(2, n_link + 1, n_time)`` of joints and tips."""
-    return tuple(
-        pair
-        for pair in _within_reach(ends, pairs, width)
-        if max(_overlap(ends, [pair], width).max(), _passing(ends, [pair])) > least
-    )
+    near = _within_reach(ends, pairs, width)
+    depth = _crossing(ends, near)
+    if width > 0:
+        gaps = [_gaps(ends, beside) for beside in _ends_beside(near)]
+        depth = _with_width(depth, np.min(gaps, axis=0), width)
+    deepest = np.maximum(depth.max(axis=1), _passing(ends, near))
+    return tuple(pair for pair, deep in zip(near, deepest, strict=True) if deep > least)
 
 
-def _overlap(
-    ends: np.ndarray, pairs: Sequence[Pair], width: float, ends_links: Sequence[Pair] | None = None
-) -> np.ndarray:
-    """`crossing_depth` of pairs, and of ends from links, by default those of the pairs."""
-    depth = np.zeros(ends.shape[2])
-    for i, j in pairs:
-        heights, _ = _seen_ends(ends, i, j)
-        crossing = (heights[0] * heights[1] < 0) & (heights[2] * heights[3] < 0)
-        depth = np.maximum(depth, np.where(crossing, np.abs(heights).min(axis=0), 0.0))
-    if width == 0:
-        return depth
-    if ends_links is None:
-        ends_links = [(a + k, b) for i, j in pairs for a, b in ((j, i), (i, j)) for k in (0, 1)]
-    gap = np.full(depth.shape, np.inf)
-    for end, link in ends_links:
-        along, to = ends[:, link + 1] - ends[:, link], ends[:, end] - ends[:, link]
-        part = np.clip((along * to).sum(axis=0) / (along * along).sum(axis=0), 0.0, 1.0)
-        gap = np.minimum(gap, np.hypot(*(to - part * along)))
+def _columns(pairs: Sequence[Pair] | np.ndarray) -> np.ndarray:
+    return np.array(pairs, dtype=int).reshape(-1, 2).T
+
+
+def _ends_beside(pairs: Sequence[Pair]) -> np.ndarray:
+    """Each end of either link, and the other link, ``(4, n_pair, 2)``."""
+    i, j = _columns(pairs)
+    return np.stack([(j, i), (j + 1, i), (i, j), (i + 1, j)]).transpose(0, 2, 1)
+
+
+def _length(vectors: np.ndarray) -> np.ndarray:
+    return np.sqrt(vectors[0] * vectors[0] + vectors[1] * vectors[1])
+
+
+def _crossing(ends: np.ndarray, pairs: Sequence[Pair]) -> np.ndarray:
+    """Depths of pairs ``(n_pair, n_time)``."""
+    heights, _ = _seen_ends(ends, pairs)
+    crossing = (heights[0] * heights[1] < 0) & (heights[2] * heights[3] < 0)
+    return np.where(crossing, np.abs(heights).min(axis=0), 0.0)
+
+
+def _gaps(ends: np.ndarray, ends_links: Sequence[Pair] | np.ndarray) -> np.ndarray:
+    """Distances of ends from links ``(k, n_time)``."""
+    end, link = _columns(ends_links)
+    along, to = ends[:, link + 1] - ends[:, link], ends[:, end] - ends[:, link]
+    part = np.clip((along * to).sum(axis=0) / (along * along).sum(axis=0), 0.0, 1.0)
+    return _length(to - part * along)
+
+
+def _with_width(depth: np.ndarray, gap: np.ndarray, width: float) -> np.ndarray:
     return depth + np.maximum(width - np.where(depth > 0, 0.0, gap), 0.0)
 
 
-def _passing(ends: np.ndarray, pairs: Sequence[Pair]) -> float:
-    deepest = 0.0
-    for i, j in pairs:
-        heights, beside = _seen_ends(ends, i, j)
-        through = (heights[:, 1:] * heights[:, :-1] < 0) & beside[:, 1:] & beside[:, :-1]
-        passed = np.minimum(np.abs(heights[:, 1:]), np.abs(heights[:, :-1]))[through]
-        deepest = max(deepest, float(passed.max(initial=0.0)))
-    return deepest
+def _passing(ends: np.ndarray, pairs: Sequence[Pair]) -> np.ndarray:
+    """Depths ``(n_pair,)`` to which links of pairs pass through each other between times."""
+    heights, beside = _seen_ends(ends, pairs)
+    through = (heights[..., 1:] * heights[..., :-1] < 0) & beside[..., 1:] & beside[..., :-1]
+    passed = np.minimum(np.abs(heights[..., 1:]), np.abs(heights[..., :-1]))
+    return np.where(through, passed, 0.0).max(axis=(0, 2), initial=0.0)
 
 
-def _seen_ends(ends: np.ndarray, i: int, j: int) -> tuple[np.ndarray, np.ndarray]:
-    """Signed distances of the ends of link j from the line of link i, then the other way round, and
-    whether they lie beside the link, ``(4, n_time)``."""
+def _seen_ends(ends: np.ndarray, pairs: Sequence[Pair]) -> tuple[np.ndarray, np.ndarray]:
+    """Of pairs (i, j) of links, signed distances of the ends of link j from the line of link i,
+    then the other way round, and whether they lie beside the link, ``(4, n_pair, n_time)``."""
     heights, beside = [], []
+    i, j = _columns(pairs)
     for line, link in ((i, j), (j, i)):
         along = ends[:, line + 1] - ends[:, line]
-        length = np.hypot(*along)
+        length = _length(along)
         for to in (ends[:, link] - ends[:, line], ends[:, link + 1] - ends[:, line]):
             heights.append((along[0] * to[1] - along[1] * to[0]) / length)
             beside.append(np.abs((along * to).sum(axis=0) / length - 0.5 * length) < 0.5 * length)
@@ -343,11 +359,11 @@ def _seen_ends(ends: np.ndarray, i: int, j: int) -> tuple[np.ndarray, np.ndarray
 def _within_reach(ends: np.ndarray, pairs: Sequence[Pair], width: float = 0.0) -> list[Pair]:
     """Pairs whose links can come nearer than their width, at a time point or on the straight way to
     the next: their middles say that most never do."""
-    middles, near = 0.5 * (ends[:, 1:] + ends[:, :-1]), []
-    lengths = np.hypot(*(ends[:, 1:] - ends[:, :-1])).max(axis=1, initial=0.0)
-    for i, j in pairs:
-        apart = middles[:, j] - middles[:, i]
-        reach = 0.5 * (lengths[i] + lengths[j] + np.hypot(*np.diff(apart)).max(initial=0.0)) + width
-        if np.hypot(*apart).min(initial=np.inf) <= reach:
-            near.append((i, j))
-    return near
+    i, j = _columns(pairs)
+    middles = 0.5 * (ends[:, 1:] + ends[:, :-1])
+    lengths = _length(ends[:, 1:] - ends[:, :-1]).max(axis=1, initial=0.0)
+    apart = middles[:, j] - middles[:, i]
+    step = _length(np.diff(apart)).max(axis=1, initial=0.0)
+    near = _length(apart).min(axis=1, initial=np.inf)
+    within = near <= 0.5 * (lengths[i] + lengths[j] + step) + width
+    return [pair for pair, here in zip(pairs, within, strict=True) if here]

@@ -38,12 +38,14 @@ class _Array:
     """A contiguous array by its address, or that address; None is a null pointer."""
 
     @classmethod
-    def from_param(cls, array: Any) -> ctypes.c_void_p | None:
+    def from_param(cls, array: Any) -> Any:
         return address(array) if isinstance(array, np.ndarray) else array
 
 
-def address(array: np.ndarray) -> ctypes.c_void_p:
+def address(array: np.ndarray) -> Any:
     assert array.flags.c_contiguous
+    if array.flags.writeable and array.size:
+        return ctypes.byref(ctypes.c_char.from_buffer(array.data))  # three times as fast
     return ctypes.c_void_p(array.ctypes.data)
 
 
