@@ -194,7 +194,8 @@ def markdown(rows: Iterable[Known]) -> str:
 
     def line(row: Known) -> str:
         problem = row.problem
-        asked = problem.asked.replace("friction (1, 1, 1)", "isotropic")
+        asked = repr(problem).partition(": ")[2].rpartition(", delta")[0]
+        asked = asked.replace("friction (1, 1, 1)", "isotropic")
         asked = asked.replace("symmetry none", "no symmetry").replace("symmetry ", "")
         told = f"{row.value:.6f} ± {row.value_error:.0e}"
         limit = (

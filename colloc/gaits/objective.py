@@ -304,11 +304,6 @@ class Period:
         return self.values["rotation"]
 
     @property
-    def length(self) -> float:
-        """Length of the path in shape space [rad]."""
-        return self.values["length"]
-
-    @property
     def efficiency(self) -> float:
         return self.distance / self.work
 

@@ -504,17 +504,15 @@ class Problem:
             and not self.grade
         )
 
-    @property
-    def asked(self) -> str:
-        """The problem in a line, for reports."""
+    def __repr__(self) -> str:
         coordinates = (
             f"{self.body.n_joint} {self.body.defaults.coordinate}{'s' * (self.body.n_joint > 1)}"
         )
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
-        return f"{best}{coordinates}, {self.law.label}{self.regime.label}, {self.gait.describe()}"
-
-    def __repr__(self) -> str:
-        return f"<Problem {self.name}: {self.asked}, delta {self.delta:.0e}>"
+        return (
+            f"<Problem {self.name}: {best}{coordinates}, {self.law.label}{self.regime.label}, "
+            f"{self.gait.describe()}, delta {self.delta:.0e}>"
+        )
 
     def with_(self, **changes: object) -> Problem:
         """A copy with some fields changed, validated anew."""

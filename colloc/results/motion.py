@@ -108,12 +108,6 @@ class Arc(NamedTuple):
         across = abs(2 * math.sin(0.5 * self.angle))
         return self.chord / across if across else math.inf
 
-    @property
-    def length(self) -> float:
-        """Length along the circle, the shorter way round [body lengths]."""
-        half = 0.5 * math.remainder(self.angle, 2 * math.pi)
-        return self.chord if half == 0 else self.chord * half / math.sin(half)
-
 
 def arc(angle: float, centre: np.ndarray) -> Arc:
     """Arc of a cycle with a turn [rad] and a path of the centre of mass ``(2, n)`` in equal

@@ -41,12 +41,12 @@ def test_the_fastest_gait_is_faster_and_less_efficient_and_the_replay_says_so(us
     best, known = fast.certificate, usual.certificate
     at = fast.problem.body, fast.problem.friction, fast.gait, fast.delta_per_period
     measured = replay(*at, objective=SPEED)
-    assert measured.value == measured.distance / measured.length
+    assert measured.value == measured.distance / measured.values["length"]
     assert measured.value == pytest.approx(best.value, abs=best.value_error)
     assert fast.value == pytest.approx(best.value, rel=1e-4)
     t = np.linspace(0, 1, 200_001)
     length = np.linalg.norm(np.diff(fast.gait.angles(t)), axis=0).sum()
-    assert measured.length == pytest.approx(length, rel=1e-8)
+    assert measured.values["length"] == pytest.approx(length, rel=1e-8)
     assert best.value > SPEED(known.values) + 100 * best.value_error
     assert best.efficiency < known.efficiency - 100 * known.efficiency_error
 
