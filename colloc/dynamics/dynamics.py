@@ -197,10 +197,6 @@ class QuasiStatic:
         """Initial orientation; 0 where it is no state."""
         return float(static[-1]) if "theta" in self.states else 0.0
 
-    def static_of(self, gait: Any) -> np.ndarray:
-        """Static parameters that a gait states, ``(n_static,)``."""
-        return np.array([getattr(gait, each.name) for each in self.static_parameters])
-
     def equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
         free = np.array([name in STATES for name in self.states])
         return CollocatedStates(mesh, free, momenta_image(self.symmetry), unit)

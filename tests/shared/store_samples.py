@@ -6,8 +6,18 @@ import numpy as np
 
 from colloc import Axis, Fourier, Harmonic, Problem, Study, ellipse, load, save
 from colloc.results.archive import Archive, Outcome, StartName, open_archive
-from colloc.studies.cell import NAME, Attempt, Visit, append_visits, read_journal
-from colloc.studies.sweep import KIND, VERSION, StudyRun, save_study, study_table
+from colloc.studies.sweep import (
+    KIND,
+    NAME,
+    VERSION,
+    Attempt,
+    StudyRun,
+    Visit,
+    append_visits,
+    read_journal,
+    save_study,
+    study_table,
+)
 from colloc.system.row_file import CACHE, put_rows, read_rows
 from colloc.system.store_file import Table, array, attribute, open_file
 from scripts.paper.study import read_arrays, write_arrays

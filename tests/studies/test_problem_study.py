@@ -26,11 +26,20 @@ from colloc.gaits.linear import Combination
 from colloc.results.archive import CRASHED, PASSED_OVER, Outcome
 from colloc.results.comparison import reversed_in_time, swap_ends
 from colloc.results.solution import NOT_CONVERGED, SOLVED
-from colloc.studies import cell as study_cell
+from colloc.studies import sweep as study_cell
 from colloc.studies import sweep as study_run
-from colloc.studies.cell import GUESS, WARM, read_journal, start_key, value_of
 from colloc.studies.study import read_study_file
-from colloc.studies.sweep import StudyRun, gait_class, save_study, study_table
+from colloc.studies.sweep import (
+    GUESS,
+    WARM,
+    StudyRun,
+    gait_class,
+    read_journal,
+    save_study,
+    start_key,
+    study_table,
+    value_of,
+)
 from colloc.system.task_pool import Lost
 from colloc.verification.replay import replay
 
@@ -477,7 +486,7 @@ def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
 def test_the_name_of_a_gait_is_the_same_in_every_process():
     gait, other = (Fourier([0.1, 0.2], [[0.4], [0.3]], [[0.0], [end]]) for end in (0.4, 0.5))
     made = f"from colloc.gaits.gait_fields import gait_from; gait = gait_from({fields(gait)})"
-    code = f"{made}; from colloc.studies.cell import start_key; print(start_key(gait))"
+    code = f"{made}; from colloc.studies.sweep import start_key; print(start_key(gait))"
     words = [sys.executable, "-c", code]
     said = subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
     assert said == start_key(gait) != start_key(other)

@@ -32,7 +32,7 @@ from colloc.results.archive import Archive, open_archive
 from colloc.search.checkpoint import ROWS
 from colloc.studies import solve as campaign
 from colloc.studies import sweep as study_run
-from colloc.studies.cell import read_journal
+from colloc.studies.sweep import read_journal
 from colloc.system import task_pool
 from colloc.system.row_file import read_rows
 

@@ -19,7 +19,7 @@ from shared.store_samples import KINDS, ROW_KINDS, Samples, outcome, problem, re
 from colloc import CollocError, StoreError
 from colloc.commands.families import multistart as show_archive
 from colloc.results.archive import StartName, archive_at, open_archive
-from colloc.studies.cell import append_visits, read_journal
+from colloc.studies.sweep import append_visits, read_journal
 from colloc.system.files import alone_in, lock_file, replaced_file
 from colloc.system.row_file import CACHE, put_rows, read_rows
 
