@@ -31,6 +31,11 @@ class Check:
     def passed(self) -> bool:
         return bool(np.isfinite(self.value) and abs(self.value) <= self.threshold)
 
+    @property
+    def share(self) -> float:
+        """Part of the tolerance that is used, by which the summary (`summary.txt`) sorts."""
+        return abs(self.value) / max(self.threshold, 1e-300)
+
     def line(self) -> str:
         return (
             f"{'ok ' if self.passed else 'NO '} {self.name:<21s} {self.value:9.1e}  (<= "
