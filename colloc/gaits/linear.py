@@ -11,7 +11,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.linalg import qr
 
 from colloc.gaits.gait import BILATERAL, NONE, SYMMETRIES, GaitFunction, finite_array, fraction
 from colloc.mechanics.bodies import Body
@@ -336,6 +335,8 @@ def _symmetric_tables(kind: LinearClass, n_joint: int) -> np.ndarray:
             f"the class {name} has no symmetry {kind.symmetry!r} for {n_joint} joints: its "
             f"functions {how} are no combinations of its functions. Take symmetry 'none'."
         )
+    from scipy.linalg import qr  # for columns alone: a tenth of a second
+
     symmetric = np.eye(len(turned)) + turned
     _, r, order = qr(symmetric, mode="economic", pivoting=True)
     first = abs(r[0, 0])

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
 
 from colloc.numerics.peaks import curvature_of_moving
 from colloc.numerics.sqp import stationarity
@@ -69,7 +68,8 @@ def curvature(program: ReducedProgram, v: np.ndarray) -> Curvature:
     fixed = np.eye(v.size)[np.abs(conditions.on_bounds) > _HELD]
     active = np.vstack([slopes[held], fixed])
     active = active / np.maximum(np.linalg.norm(active, axis=1, keepdims=True), 1e-300)
-    free = null_space(active, rcond=_ONE_ROW) if active.size else np.eye(v.size)
+    _, sizes, directions = np.linalg.svd(active)
+    free = directions[int((sizes > _ONE_ROW * sizes.max(initial=0.0)).sum()) :].T
     if free.shape[1] == 0:
         return Curvature(np.inf, 0.0, 0, np.zeros(v.size), conditions.kkt_error, value)
 
