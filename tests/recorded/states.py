@@ -49,7 +49,7 @@ STATED = {
     "turning": {"friction": UNEQUAL, "rotation": None, "guess": SKEW},
     "swimmer": {"friction": Viscous(normal=2, tangential=1), "objective": "towing"},
     "wrong": {"friction": Viscous(normal=2, tangential=1), "objective": "towing"},
-    "brakes": {"gait": Harmonic(2), "froude": 1.0, "guess": SWUNG},
+    "brakes": {"gait": Harmonic(2), "froude": 0.5, "guess": SWUNG},
     "stuck": {
         "body": Chain((0.2, 0.3, 0.3, 0.2)),
         "gait": Coupled(Harmonic(1), stuck={1: 0.4}),
@@ -77,7 +77,7 @@ STATED = {
     },
 }
 GUESSES = {
-    "brakes": 0.0231,
+    "brakes": 0.0256,
     "feet": 0.31,
     "slope": 0.18,
     "climb": 0.083,

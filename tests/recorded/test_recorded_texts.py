@@ -251,14 +251,15 @@ def same(found, known):
 def same_number(found, known, is_error=False):
     if found == known:
         return True
-    a, b = (abs(float(text.replace("−", "-"))) for text in (found, known))
+    a, b = (float(text.replace("−", "-")) for text in (found, known))
     if is_error or "e-" in found + known:
-        least = OF_MACHINE if is_error else ROUNDING
-        return max(a, b) < least or max(a, b) <= FACTOR * min(a, b)
+        larger, smaller = max(abs(a), abs(b)), min(abs(a), abs(b))
+        alike = larger <= FACTOR * smaller and (a > 0) == (b > 0)
+        return alike or larger < (OF_MACHINE if is_error else ROUNDING)
     if "." not in found + known:
         return False
-    apart = abs(float(found.replace("−", "-")) - float(known.replace("−", "-")))
-    return apart <= 1.01 * 10.0 ** -len(known.partition(".")[2].partition("e")[0]) + PRECISION * b
+    unit = 10.0 ** -len(known.partition(".")[2].partition("e")[0])
+    return abs(a - b) <= 1.01 * unit + PRECISION * abs(b)
 
 
 @pytest.fixture(scope="module")
