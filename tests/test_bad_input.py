@@ -24,6 +24,7 @@ AT = (Chain(), Friction())
 TINY = 1e-9
 ONES = np.ones((2, 4))
 DRAG = colloc.Viscous(normal=2, tangential=1)
+FIVE, UNEVEN = Chain((0.2,) * 5), ((1, 0), (0.5, 0), (0, 1), (0, 1))
 BUMP = np.sin(2 * np.pi * np.arange(50) / 50)
 MIRRORED = Harmonic(1, "bilateral")
 SAMPLES = [[0.1, 0.1, 0.1], [0.5, 0.5, 0.5], [2.0, 2.0, 2.0]]
@@ -204,6 +205,10 @@ def test_coefficients_that_are_equal_or_named_do_not_warn():
 SENTENCES = r"""
 Objective("1") | Objective("log(-1)") -> uses no quantity
 Objective("distance ** 1000") | Objective("0 * distance") -> too flat or too steep
+Objective("__import__('os').remove('x')") | Objective("distance.real") | Objective("lambda: 1") | Objective("f'{work}'") -> objective
+Objective("distance**work") | Objective("True * work") | Objective("distance if work else 0") | Objective("abs(1, 2)") -> objective
+Objective("speeed") | Objective("distance /") | Objective("") | Objective("distance / 0") | Objective("-distance") -> objective
+Objective("9**9**9 * distance") | Objective("work < 2") | Objective("1 + " * 200 + "distance") | Objective("-" * 450 + "distance") -> objective
 Objective("distance / work + 1/0") | Objective("distance * (-1) ** 0.5") -> no finite real number
 Quantity("heat", "sum(moment ** 2) * 9.0**9**9") -> no finite real number
 OwnLaw("1/0", "-vn/speed") -> no finite real number
@@ -235,6 +240,7 @@ replay(Chain(), "friction", GAIT, 1e-3) -> friction must be a Law
 replay(3, Friction(), GAIT, 1e-3) -> body must be a
 replay(*AT, [1.0, 2.0], 1e-3) -> path must be a function
 replay(*AT, path(0.7, 0.0), 1e-4) -> does not move
+replay(*AT, GAIT, 1e-2, froude=0.3, quantities=["driven_work"], breaks=(0.5,)) -> joint rates jump: leave driven_work out
 Friction(1, mu_t=2) -> multiple values for argument 'mu_t'
 Problem("x", froude=Free("a", 1)) -> two numbers above 0
 Fourier([0], [[1]], [[0]], theta=float("nan")) -> theta must be a number
@@ -505,6 +511,8 @@ gait=Polygon(4), scheme="trapezoid" -> gauss-N or radau-N
 gait=Polygon(4), body=Chain((0.5, 0.5)), guess=Fourier([0.0], [[1.0]], [[0.0]]) -> three links
 gait=Polygon(4, "bilateral"), body=Chain((0.2, 0.3, 0.5)) -> both ends
 gait=Serpenoid(), body=Chain((0.5, 0.5)) -> at least three links
+gait=Coupled(Harmonic(1, "bilateral"), gears=UNEVEN), body=FIVE -> symmetry none or antipodal
+gait=Coupled(MIRRORED, stuck={1: 0.4}), body=FIVE | gait=Coupled(Harmonic(1, "antipodal"), stuck={1: 0.4}), body=FIVE -> may have the symmetry none
 gait=Harmonic(1), joint_limit=0.05 -> with joint_limit the usual first gait
 objective="turning" -> rotation
 rotation=0.2, gait=MIRRORED -> bilateral gait turns
@@ -540,6 +548,7 @@ gait=Basis([BUMP]), friction=Friction(mu_t=1, mu_f=1, mu_b=2)
 froude=0.1, body=Chain((0.4, 0.6)), gait=Harmonic(3, "antipodal"), friction=Friction(mu_t=2.0)
 froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(2)
 delta_start=0.0
+gait=Coupled(Harmonic(1, "antipodal"), gears=UNEVEN), body=FIVE
 """
 
 

@@ -272,7 +272,6 @@ CHAIN = colloc.Chain((0.3, 0.25, 0.45), masses=(0.2, 0.2, 0.6), inertias=(0.002,
 FLOOR, DELTA, FROUDE = colloc.Friction(mu_t=1.3, mu_f=0.7, mu_b=1.1), 0.05, 0.3
 DRIVEN = colloc.Objective("driven efficiency")
 ALL = colloc.Quantity("all_power", "sum(power)")
-PACED = "distance / (driven_work + 0.05 * period)"
 
 
 def driven_problem(**fields):
@@ -386,32 +385,3 @@ def test_a_gait_of_least_driven_work_is_certified_and_beats_that_of_least_work()
     again = colloc.evaluate(stated, other.gait)
     assert again.status == "solved", again.message
     assert found.value > 1.001 * again.value
-
-
-@pytest.mark.slow
-def test_a_pace_is_best_where_time_and_energy_are_worth_the_same():
-    stated = {"body": colloc.Chain(), "friction": colloc.Friction(), "guess": None}
-    stated |= {"gait": colloc.Harmonic(1, "antipodal"), "rotation": 0.0, "delta": 1e-2}
-    stated |= {"objective": PACED, "mesh_tolerance": 1e-4}
-    found = colloc.solve(driven_problem(froude=colloc.Free(0.01, 1.0), **stated), starts=1)
-    assert found.status == "solved", found.message
-    assert 0.02 < found.froude < 0.5
-    beside = [
-        with_inertia(
-            colloc.Chain(), colloc.Friction(), found.gait, 1e-2, by * found.froude,
-            objective=colloc.Objective(PACED),
-        )
-        for by in (0.7, 1.0, 1.4)
-    ]  # fmt: skip
-    values = [colloc.Objective(PACED)(each.values) for each in beside]
-    assert values[1] > max(values[0], values[2])
-    assert values[1] == pytest.approx(found.value, rel=1e-4)
-
-
-def test_where_torques_are_infinite_they_are_refused():
-    corners = colloc.Corners(np.array([[0.0, 1.5, 0.4], [0.0, 0.2, 1.4]]))
-    with pytest.raises(colloc.ProblemError, match="joint rates jump: leave driven_work out"):
-        colloc.replay(
-            CHAIN, FLOOR, corners, DELTA, froude=FROUDE, quantities=["driven_work"],
-            breaks=corners.corner_phases,
-        )  # fmt: skip

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import Chain, Coupled, Friction, Harmonic, Problem, ProblemError
+from colloc import Chain, Coupled, Friction, Harmonic, Problem
 from colloc.gaits.gait_fields import CLASSES, fields, gait_from, part_from
 from colloc.mechanics.densities import JointMap
 from colloc.results.robot import joint_torques
@@ -75,16 +75,6 @@ def test_what_is_the_same_from_both_ends_has_both_symmetries(symmetry):
     joints = found.gait.angles(np.linspace(0, 1, 9))
     image = -joints[::-1, ::-1] if symmetry == "bilateral" else -np.roll(joints[:, :-1], 4, axis=1)
     np.testing.assert_allclose(image, joints[:, : image.shape[1]], atol=1e-9)
-
-
-def test_symmetries_that_gears_or_stuck_joints_break_are_refused():
-    uneven = ((1, 0), (0.5, 0), (0, 1), (0, 1))
-    stated(FIVE, Coupled(Harmonic(1, "antipodal"), gears=uneven))
-    with pytest.raises(ProblemError, match="symmetry none or antipodal"):
-        stated(FIVE, Coupled(Harmonic(1, "bilateral"), gears=uneven))
-    for symmetry in ("bilateral", "antipodal"):
-        with pytest.raises(ProblemError, match="may have the symmetry none"):
-            stated(FOUR, Coupled(Harmonic(1, symmetry), stuck={1: 0.4}))
 
 
 @pytest.mark.slow

@@ -36,25 +36,6 @@ def moments(body, law, angles, rates, delta):
     return joint_moments(body, angles, body.forces(law, angles, rates, z, delta)), z
 
 
-def test_a_joint_balances_the_friction_on_all_that_lies_ahead_of_it():
-    angles, rates = random_instants(6)
-    found, z = moments(BODY, LAW, angles, rates, 1e-2)
-    now = instant(BODY, LAW, angles, rates, z, 1e-2)
-    along = np.array(BODY.lengths)[:, None] * ((np.arange(20000) + 0.5) / 20000 - 0.5)
-    for k in range(6):
-        vs, vn, w = (part[:, [k]] for part in now.velocity)
-        vn = vn + w * along
-        speed, turn = np.sqrt(vs**2 + vn**2 + 1e-4), now.posture.cos + 1j * now.posture.sin
-        force = -(np.where(vs > 0, LAW.mu_f, LAW.mu_b) * vs + 1j * LAW.mu_t * vn) / speed
-        force = force * np.array(BODY.weights)[:, None] / 20000
-        middle = (now.posture.x + 1j * now.posture.y)[:, [k]] / turn[:, [k]] + along
-        hinges = np.array([1, 1j]) @ np.stack(BODY.joints(angles[:, [k]]))[:, :, 0]
-        for joint in (0, 1):
-            arm = middle - hinges[joint + 1] / turn[:, [k]]
-            torque = (arm.conj() * force)[joint + 1 :].imag.sum()
-            assert found[joint, k] == pytest.approx(-torque, abs=1e-7)
-
-
 @pytest.mark.parametrize(
     ("law", "degree"),
     [(LAW, 0), (colloc.PowerLaw(0.5, mu_t=2.0), 0.5), (Viscous(normal=2, tangential=1), 1)],
