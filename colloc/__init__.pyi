@@ -29,8 +29,7 @@ from colloc.gaits.harmonic import Fourier as Fourier, ellipse as ellipse
 from colloc.gaits.regime import Free as Free
 from colloc.gaits.robot import Robot as Robot
 from colloc.gaits.bspline import BSpline as BSpline, Polygon as Polygon
-from colloc.gaits.columns import Basis as Basis
-from colloc.gaits.bspline import Corners as Corners
+from colloc.gaits.bspline import Basis as Basis, Corners as Corners
 from colloc.studies.solve import solve as solve, multistart as multistart, Starts as Starts
 from colloc.studies.sweep import sweep as sweep
 from colloc.studies.study import Study as Study, Axis as Axis

@@ -10,7 +10,7 @@ import pytest
 import colloc
 from colloc import Chain, Foot, Friction, Harmonic, PowerLaw, Problem, ProblemError, Wave
 from colloc.bounds.sampled import Budget, TensorSpline, efficiency_bound
-from colloc.gaits.prescribed import Prescribed
+from colloc.gaits.harmonic import Prescribed
 from colloc.smooth.balance import Motion, solve_smooth
 from colloc.system.errors import OrderWarning
 from colloc.verification.differential_motion import checked_chain

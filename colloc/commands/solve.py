@@ -23,8 +23,7 @@ from colloc.gaits.problem_file import ProblemFile, Reference, read_problem_file
 from colloc.gaits.regime import Free
 from colloc.gaits.robot import Robot
 from colloc.mechanics.chain import Chain
-from colloc.results import limit_use
-from colloc.results.robot import in_si
+from colloc.results.robot import in_si, limit_lines, limit_shares
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
 from colloc.results.store import Saved, save_result
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
@@ -248,7 +247,7 @@ def summary_lines(
         moves = [math.degrees(swing) for swing in solution.swings]
     return render(
         "summary.txt", solution=solution, reference=reference, verbose=verbose, slowly=slowly,
-        si=in_si(solution), limits=limit_use.lines(solution) if replayed else [], pace=pace,
+        si=in_si(solution), limits=limit_lines(solution) if replayed else [], pace=pace,
         moves=moves, whole=lambda row: ", ".join(f"{x:.0f}" for x in row), efficiency=EFFICIENCY,
     ).splitlines()  # fmt: skip
 
@@ -276,7 +275,7 @@ def summary_dict(
         "variables": int(answer.x.size),
         "constraints": int(answer.lam_g.size),
         "shrunk": None if solution.shrunk is None else solution.shrunk.value,
-        "limits": limit_use.shares(solution) if replayed else {},
+        "limits": limit_shares(solution) if replayed else {},
         "robot": in_si(solution),
         "swings_rad": solution.swings.tolist() if problem.gait.free else [],
         "tiny": solution.is_tiny,

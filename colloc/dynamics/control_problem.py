@@ -16,9 +16,9 @@ import numpy as np
 from colloc.dynamics.dynamics import QuasiStatic, StaticParameter, dynamics_of
 from colloc.gaits.gait import fraction
 from colloc.gaits.gait_fields import AnyClass, AnyGait
-from colloc.gaits.limits import Limit, widest
 from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
+from colloc.gaits.robot import Limit, widest
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimits, Quantity
 from colloc.numerics.mesh import Mesh

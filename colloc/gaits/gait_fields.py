@@ -10,12 +10,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from colloc.gaits.bspline import BSpline, Corners, Polygon
-from colloc.gaits.columns import Basis
+from colloc.gaits.bspline import Basis, BSpline, Corners, Polygon
 from colloc.gaits.coupled import Coupled
-from colloc.gaits.harmonic import Fourier, Harmonic, Serpenoid, SerpenoidSeries
+from colloc.gaits.harmonic import Fourier, Harmonic, Phases, Prescribed, Serpenoid, SerpenoidSeries
 from colloc.gaits.linear import Combination
-from colloc.gaits.prescribed import Phases, Prescribed
 from colloc.gaits.robot import Robot
 from colloc.laws.own_law import OwnLaw
 from colloc.laws.resistance import Elliptic, PowerLaw, Viscous

@@ -13,13 +13,19 @@ import numpy as np
 from colloc.gaits import gait_fields
 from colloc.gaits.gait import ANTIPODAL, BILATERAL, NONE, fraction
 from colloc.gaits.gait_fields import AnyClass, AnyGait, check_kind
-from colloc.gaits.harmonic import Harmonic
-from colloc.gaits.limits import Limit, checked_actuator_limit, checked_limit, joint_ranges, of_each
+from colloc.gaits.harmonic import Harmonic, Prescribed
 from colloc.gaits.linear import LinearClass
 from colloc.gaits.objective import EFFICIENCY, Objective, integrals_of, least_values, objective_from
-from colloc.gaits.prescribed import Prescribed
 from colloc.gaits.regime import LEVEL, Free, Regime, regime_of
-from colloc.gaits.robot import DERIVED, Robot
+from colloc.gaits.robot import (
+    DERIVED,
+    Limit,
+    Robot,
+    checked_actuator_limit,
+    checked_limit,
+    joint_ranges,
+    of_each,
+)
 from colloc.gaits.starts import check_guess, default_guess
 from colloc.mechanics.bodies import FULL, Body
 from colloc.mechanics.chain import Chain, formulations

@@ -17,7 +17,7 @@ import numpy as np
 
 from colloc.gaits.gait import symmetric_samples
 from colloc.gaits.harmonic import Fourier, Harmonic
-from colloc.gaits.limits import Limit, under_one_limit
+from colloc.gaits.robot import Limit, under_one_limit
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, link_width

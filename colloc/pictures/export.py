@@ -31,7 +31,7 @@ from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.interpolate import CubicHermiteSpline
 
 from colloc.gaits.gait_fields import fields
-from colloc.gaits.limits import joint_ranges
+from colloc.gaits.robot import joint_ranges
 from colloc.laws.resistance import Elliptic
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth

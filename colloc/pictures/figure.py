@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from colloc.dynamics.control_problem import control_problem
-from colloc.gaits.limits import Limit, under_one_limit
+from colloc.gaits.robot import Limit, under_one_limit
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.contact import crossing_depth, link_width
 from colloc.mechanics.floor_contact import FOOT, WHEEL

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from colloc.dynamics.control_problem import control_problem
-from colloc.gaits.limits import under_one_limit
 from colloc.gaits.problem import Problem
+from colloc.gaits.robot import under_one_limit
 from colloc.mechanics.chain import BALANCED, Chain
 from colloc.mechanics.contact import crossing_depth, passing_depth
 from colloc.results.answer import EVALUATED, Answer

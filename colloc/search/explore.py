@@ -31,8 +31,8 @@ from colloc.bounds.motions import (
 from colloc.gaits.bspline import Corners
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier, ellipse
-from colloc.gaits.limits import widest
 from colloc.gaits.problem import Problem
+from colloc.gaits.robot import widest
 from colloc.gaits.starts import (
     is_visible,
     largest_factor,

@@ -10,7 +10,7 @@ import numpy as np
 
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.prescribed import Prescribed
+from colloc.gaits.harmonic import Prescribed
 from colloc.gaits.problem import Problem
 from colloc.mechanics.contact import Pairs
 from colloc.numerics.sqp import Stationarity, stationarity

@@ -307,7 +307,7 @@ _CHORD_NODES, _CHORD_WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 class PrescribedBody(SmoothBody):
     """A smooth body that runs through a `Motion`, always solved on panels that adapt. Its shape
-    coordinates are the phase, as a point on a circle (`colloc.gaits.prescribed`)."""
+    coordinates are the phase, as a point on a circle (`colloc.gaits.harmonic`)."""
 
     n_joint = 2
     # nobody optimised the motion: a replay need not look at it ten times as closely as the mesh

@@ -25,11 +25,10 @@ import numpy as np
 
 from colloc.gaits.gait import ANTIPODAL, NONE
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.limits import one_sided
 from colloc.gaits.objective import DRIVEN, Objective, Period, objective_from
 from colloc.gaits.problem import Problem
 from colloc.gaits.regime import Free
-from colloc.gaits.robot import BATTERY
+from colloc.gaits.robot import BATTERY, one_sided
 from colloc.results.solution import Solution
 from colloc.results.store import load
 from colloc.search.explore import with_reachable_distance

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from colloc.dynamics.control_problem import ControlProblem
-from colloc.gaits.limits import Limit, joint_ranges
+from colloc.gaits.robot import Limit, joint_ranges
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.contact import Pairs, held_minimum, share_of_first
 from colloc.mechanics.densities import JointMap

@@ -24,7 +24,7 @@ from colloc.dynamics.control_problem import Admissible, ControlProblem
 from colloc.dynamics.dynamics import OMEGA, Inertial, PeriodTotals, Shapes, Trajectory
 from colloc.gaits.gait import NONE
 from colloc.gaits.gait_fields import AnyGait
-from colloc.gaits.limits import under_one_limit
+from colloc.gaits.robot import under_one_limit
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.contact import crossing_depth, far_pairs

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colloc.gaits.limits import checked_actuator_limit, of_each
+from colloc.gaits.robot import checked_actuator_limit, of_each
 from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 from colloc.verification.adaptive_motion import Path

@@ -9,8 +9,7 @@ import pytest
 import colloc
 from colloc import Chain, Fourier, Harmonic, PathLimit, Problem, ellipse, evaluate, replay
 from colloc.commands.solve import summary_dict, summary_lines
-from colloc.results import limit_use
-from colloc.results.robot import joint_torques
+from colloc.results.robot import joint_torques, limit_lines
 from tests.shared.cases import slow_but
 
 LOOP = ellipse(0.0, 1.2, 0.8)
@@ -83,5 +82,5 @@ def test_a_limit_that_a_gait_reaches_is_never_said_not_to_matter(harmonics):
         torque, power = (0.99 * part.max() for part in np.split(shares, 2))
         limits = {"torque_limit": torque, "power_limit": power, "speed_limit": 0.99 * most}
         limits |= {"joint_limit": 1.2, "guess": None}
-        said = limit_use.lines(evaluate(stated.with_(**limits), gait))
+        said = limit_lines(evaluate(stated.with_(**limits), gait))
         assert not any("cannot matter" in line for line in said)

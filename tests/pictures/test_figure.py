@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from shared.readable import assert_readable
 
 from colloc import Chain, Foot, Fourier, Friction, Harmonic, ModalBody, Pad, Problem, Wheel, save
-from colloc.gaits.limits import under_one_limit
+from colloc.gaits.robot import under_one_limit
 from colloc.mechanics.contact import crossing_depth
 from colloc.pictures.figure import draw_filmstrip, draw_lab, forbidden, panels
 from colloc.pictures.style import save as save_figure

@@ -16,8 +16,8 @@ from colloc.mechanics.densities import DRIVEN_WORK, Instants, PathLimits, torque
 from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.inertia import inertial_moments
 from colloc.reduced.program import ReducedProgram
-from colloc.results.limit_use import lines
 from colloc.results.robot import joint_torques as sheet_torques
+from colloc.results.robot import limit_lines as lines
 from colloc.search.iterate import space_near
 from colloc.search.options import OPTIONS
 from colloc.search.solve import solve

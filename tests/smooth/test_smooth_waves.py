@@ -13,7 +13,7 @@ from colloc.commands.main import main as colloc_main
 from colloc.commands.results import export
 from colloc.gaits.gait_fields import BODIES as KINDS
 from colloc.gaits.gait_fields import CLASSES, fields, part_from
-from colloc.gaits.prescribed import Prescribed
+from colloc.gaits.harmonic import Prescribed
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.fixed_point import chain_motion
 from colloc.pictures.movie import frames
