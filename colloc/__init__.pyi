@@ -19,8 +19,8 @@ from colloc.mechanics.friction import Friction as Friction
 from colloc.laws.resistance import Elliptic as Elliptic
 from colloc.laws.resistance import Viscous as Viscous
 from colloc.laws.resistance import PowerLaw as PowerLaw
-from colloc.laws.own_law import OwnLaw as OwnLaw
-from colloc.laws.fitted_friction import (
+from colloc.laws.own_law import (
+    OwnLaw as OwnLaw,
     fitted_friction as fitted_friction,
     FittedFriction as FittedFriction,
 )

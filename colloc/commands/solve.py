@@ -255,7 +255,6 @@ def summary_lines(
 def summary_dict(
     solution: Solution, path: Path | None, reference: Reference | None, bound: Bound | None
 ) -> dict:
-    """A solution as one JSON object."""
     problem, answer, certificate = solution.problem, solution.answer, solution.certificate
     replayed = certificate.replayed
     plain = {

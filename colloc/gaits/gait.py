@@ -96,7 +96,6 @@ class GaitFunction:
         return lines
 
     def with_coordinate(self, coordinate: str) -> Any:
-        """The gait with another name for its shape coordinates."""
         gait = copy.copy(self)
         object.__setattr__(gait, "coordinate", coordinate)
         return gait

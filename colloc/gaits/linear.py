@@ -161,7 +161,6 @@ class LinearClass:
 
     @property
     def fraction(self) -> float:
-        """Part of the cycle that is solved; symmetry gives the rest."""
         return fraction(self.symmetry)
 
     # meshes

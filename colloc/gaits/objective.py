@@ -173,7 +173,6 @@ class Objective:
         return sum(slope * slopes[name] for name, slope in self.partials(period).items())
 
     def partials(self, period: Mapping[str, float]) -> dict[str, float]:
-        """Derivative with respect to each of its variables."""
         partials = self._formula.partials({name: period[name] for name in self.uses})
         return {name: float(partials[name]) for name in self.uses}
 
@@ -200,7 +199,6 @@ class Objective:
         return f"{self.name} {self.short}" if self.short != self.name else self.name
 
     def fields(self) -> dict[str, Any]:
-        """Plain dictionary (JSON)."""
         plain: dict[str, Any] = {"expression": self.expression, "name": self.name}
         quantities = [each.fields() for each in self.quantities]
         return plain | ({"quantities": quantities} if quantities else {})
@@ -308,7 +306,6 @@ class Period:
         return self.distance / self.work
 
     def error_of(self, objective: Objective) -> float:
-        """Relative error of an objective."""
         return float(objective.relative_error(self.values, self.errors))
 
     def ambiguity_of(self, objective: Objective) -> float:

@@ -461,7 +461,6 @@ class Problem:
 
     @property
     def fraction(self) -> float:
-        """Part of the cycle that is solved; symmetry gives the rest."""
         return fraction(self.regime.motion_symmetry(self.gait.symmetry))
 
     @property
@@ -492,7 +491,6 @@ class Problem:
         return (self.objective, *(aim for aim, _ in self.at_least))
 
     def uses(self, quantity: str) -> bool:
-        """True if one of the `aims` depends on a quantity."""
         return any(quantity in aim.uses for aim in self.aims)
 
     @property

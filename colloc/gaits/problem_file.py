@@ -46,7 +46,6 @@ class Reference:
     source: str
 
     def verdict(self, efficiency: float) -> str:
-        """Compare an efficiency with it, in words."""
         verb = (
             "agrees with" if abs(efficiency - self.efficiency) <= self.tolerance else "DIFFERS from"
         )

@@ -264,7 +264,6 @@ def _check_grade(grade: object) -> None:
 
 
 def regime_of(problem: Any) -> Regime:
-    """The regime that a problem states. `ProblemError` if there is none like it."""
     grade, towards, froude = problem.grade, problem.towards, problem.froude
     _check_grade(grade)
     if towards is not None and not is_number(towards):

@@ -115,7 +115,6 @@ class Answer:
 
     @cached_property
     def delta_per_period(self) -> float:
-        """Regularisation speed [body lengths per period]."""
         return delta_per_period(self.problem.gait, self.gait, self.delta)
 
     # its motion at any time, by the scheme's own interpolant

@@ -91,7 +91,6 @@ class RigidMotion:
         )
 
     def of(self, points: np.ndarray) -> np.ndarray:
-        """Image of points ``(2, ..., n)``."""
         x, y = rotate(points, self.rotation)
         return np.stack([x + np.real(self.shift), y + np.imag(self.shift)])
 

@@ -241,7 +241,6 @@ class RobotSheet:
 
     @property
     def pressing(self) -> float:
-        """Component of gravity normal to the ground [m/s^2]."""
         return pressing(self.solution, self.gravity)
 
     @property
@@ -358,7 +357,6 @@ class RobotSheet:
         return facts
 
     def lines(self) -> list[str]:
-        """Return the data sheet as lines of text."""
         law, coordinate = self.solution.problem.law, self.solution.gait.motor_gait.coordinate
         text: str = higher("pictures:render")(
             "robot.txt", robot=self, f=self.facts, coordinate=coordinate, degrees=math.degrees,
@@ -367,7 +365,6 @@ class RobotSheet:
         return text.splitlines()
 
     def sentences(self) -> list[str]:
-        """Return remarks on the numbers."""
         return str(self).rpartition("\n\n")[2].replace("\n  ", "\n").strip().splitlines()
 
     def __str__(self) -> str:

@@ -23,8 +23,6 @@ _LARGEST = 1e150  # sums of squares of smaller numbers are finite
 
 
 class Table(NamedTuple):
-    """Numbers of a text file and what surrounds them."""
-
     names: list[str]  # of the columns; empty if the file has none
     units: list[str]  # from a row below the names, else empty texts
     values: np.ndarray  # (n_row, n_column); NaN where there is no number

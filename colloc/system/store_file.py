@@ -138,7 +138,6 @@ class Table:
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the columns as an xarray Dataset."""
         columns = {
             name: (self.dimensions[name], values, {"units": self.units.get(name, "1")})
             for name, values in self.variables.items()

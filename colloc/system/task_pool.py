@@ -109,8 +109,6 @@ def process_pool(workers: int) -> Executor:
 
 
 class _InThisProcess(Executor):
-    """Runs every task when it is submitted."""
-
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future:
         future: Future = Future()
         try:
