@@ -153,31 +153,21 @@ def starts_itself(path):
 PROGRAMS = [path for path in MODULES if starts_itself(path) and path.stem not in EXAMPLES]
 
 
-@pytest.fixture
-def ended(tmp_path, monkeypatch, capfd):
-    """A function from a program and an option to its exit code, output and errors."""
-
-    def run(path, option):
-        needed(path)
-        module = importlib.import_module(name_of(path))
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", [str(path), option])
-        with pytest.raises(SystemExit) as ended:
-            module.main()
-        assert not list(tmp_path.iterdir())
-        return ended.value.code, *capfd.readouterr()
-
-    return run
-
-
 @pytest.mark.parametrize("path", PROGRAMS, ids=name_of)
+@pytest.mark.parametrize(("option", "code"), [("--help", 0), ("--no-such-option", 2)])
 def test_a_program_answers_help_before_it_does_anything_and_refuses_what_it_does_not_understand(
-    path, ended
+    path, option, code, tmp_path, monkeypatch, capfd
 ):
-    code, said, complaints = ended(path, "--help")
-    assert (code, complaints) == (0, "")
-    assert said.startswith("usage:")
-    assert len(said.split()) > 10, "says nothing but its usage"
-    code, _, complaints = ended(path, "--no-such-option")
-    assert code == 2
-    assert complaints.startswith("usage:")
+    needed(path)
+    module = importlib.import_module(name_of(path))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(path), option])
+    with pytest.raises(SystemExit) as ended:
+        module.main()
+    assert ended.value.code == code
+    assert not list(tmp_path.iterdir())
+    said = capfd.readouterr()
+    assert (said.err if code else said.out).startswith("usage:")
+    if not code:
+        assert len(said.out.split()) > 10, "says nothing but its usage"
+        assert said.err == ""

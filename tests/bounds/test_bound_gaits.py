@@ -36,11 +36,6 @@ def bound_of(mu: tuple[float, float, float]) -> Bound:
     return efficiency_bound(Chain(), friction, budget=ODD if friction.reversible else DIRECTED)
 
 
-@pytest.fixture(scope="module")
-def isotropic() -> Bound:
-    return bound_of((1.0, 1.0, 1.0))
-
-
 def antipodal_fourier(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Random gaits q(t + 1/2) = -q(t), so any friction closes the rotation."""
     t = (np.arange(STEPS) + 0.5) / STEPS
@@ -98,8 +93,9 @@ def test_no_random_gait_beats_the_bound(mu):
     assert best > 0.1
 
 
-def test_a_bound_is_pinned_from_both_sides(isotropic):
+def test_a_bound_is_pinned_from_both_sides():
     """Reached at the motion it names, at least the program's optimum, not exceeded."""
+    isotropic = bound_of((1.0, 1.0, 1.0))
 
     def value(q, r):
         samples = Samples(

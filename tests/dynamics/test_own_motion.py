@@ -120,12 +120,8 @@ PROBLEM = Problem(
 )
 
 
-@pytest.fixture
-def kept(monkeypatch):
+def test_a_kind_of_motion_in_one_file_is_solved_certified_kept_and_read(monkeypatch, tmp_path):
     monkeypatch.setattr(gait_fields, "MOTIONS", [Pushed])
-
-
-def test_a_kind_of_motion_in_one_file_is_solved_certified_kept_and_read(kept, tmp_path):
     found = solve(PROBLEM, starts=1)
     assert found.status == "solved", found.message
     assert "pushed by 0.1" in repr(PROBLEM)

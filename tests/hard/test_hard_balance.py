@@ -150,12 +150,6 @@ def test_two_links_that_nearly_rest_beside_one_that_turns_are_followed_from_smoo
 needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler")
 
 
-def by_both(*arguments, **named):
-    compiled = solve_balance(*arguments, **named)
-    with numpy_instead():
-        return compiled, solve_balance(*arguments, **named)
-
-
 @needs_kernel
 @pytest.mark.parametrize(
     "delta", [pytest.param(d, marks=[pytest.mark.slow] * (d not in (1e-2, 1e-8))) for d in DELTAS]
@@ -164,9 +158,10 @@ def by_both(*arguments, **named):
 def test_every_hard_instant_moves_as_numpy_says(coefficients, delta):
     """A residual leaves the velocity uncertain by max(mu)/min(mu) times as much, so a small one is
     asked for."""
-    compiled, reference = by_both(
-        Chain(), coulomb(*coefficients), ANGLES, RATES, delta, tolerance=1e-13
-    )
+    at = BODY, coulomb(*coefficients), ANGLES, RATES, delta
+    compiled = solve_balance(*at, tolerance=1e-13)
+    with numpy_instead():
+        reference = solve_balance(*at, tolerance=1e-13)
     np.testing.assert_allclose(compiled.z / SPEED, reference.z / SPEED, rtol=0, atol=1e-9)
 
 

@@ -16,12 +16,9 @@ GEARS = ((1, 0), (0.5, 0), (0, 0.5), (0, 1))
 BELTS, BROKEN = Coupled(Harmonic(1), gears=GEARS), Coupled(Harmonic(1), stuck={1: 0.4})
 
 
-def stated(body, gait, **changes):
-    return Problem("c", body=body, friction=LAW, gait=gait, **{"delta": 1e-2} | changes)
-
-
 def solved(body, gait, starts=2, **changes):
-    return colloc.solve(stated(body, gait, **changes), starts=starts)
+    problem = Problem("c", body=body, friction=LAW, gait=gait, **{"delta": 1e-2} | changes)
+    return colloc.solve(problem, starts=starts)
 
 
 @pytest.fixture(scope="module")

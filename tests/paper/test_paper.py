@@ -19,15 +19,11 @@ T = np.linspace(0, 1, 4001)
 BEST = np.array([[0.0], [2.859], [1.3018]])
 
 
-def _random_gaits(count: int, seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    A0, angle = rng.uniform(0, 2.6, count), rng.uniform(0.1, 1.5, count)
-    amplitude = rng.uniform(0.3, 1.0, count) * ellipses.largest_amplitude(A0, angle)
-    return np.stack([A0, amplitude * np.cos(angle), amplitude * np.sin(angle)])
-
-
 def test_half_a_period_gives_what_a_replay_of_the_whole_period_gives():
-    gaits = _random_gaits(4, 21)
+    rng = np.random.default_rng(21)
+    A0, angle = rng.uniform(0, 2.6, 4), rng.uniform(0.1, 1.5, 4)
+    amplitude = rng.uniform(0.3, 1.0, 4) * ellipses.largest_amplitude(A0, angle)
+    gaits = np.stack([A0, amplitude * np.cos(angle), amplitude * np.sin(angle)])
     found = ellipses.performance(DELTA, gaits, instants=1600)
     for i, gait in enumerate(gaits.T):
         exact = replay(BODY, ISOTROPIC, ellipse(*gait), DELTA, tolerance=1e-5)

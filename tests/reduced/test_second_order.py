@@ -25,12 +25,6 @@ PROBLEM = Problem("bilateral", gait=Harmonic(1, "bilateral"), intervals=100)
 SADDLE = ellipse(0.0, 0.30734, 0.76781)
 
 
-def program_at(problem, gait):
-    """The reduced program, with its checks placed, and the parameters of a gait."""
-    space, v = space_near(problem, gait)
-    return ReducedProgram(space, problem.delta), v
-
-
 class Touching:
     """Minimise x^2 + b y^2 - p x with x cos t + y sin t <= 1 at all t: rows at the worst t, which
     turns with y.
@@ -111,7 +105,8 @@ def test_the_peak_of_a_moment_moves_with_the_gait():
 
 
 def test_the_gait_between_two_ways_of_bending_is_a_saddle():
-    program, v = program_at(PROBLEM, SADDLE)
+    space, v = space_near(PROBLEM, SADDLE)
+    program = ReducedProgram(space, PROBLEM.delta)
     found = curvature(program, v)
     assert found.kkt_error < 1e-3
     assert found.n_free == 3
@@ -198,15 +193,11 @@ def saddle():
     return evaluate_at(space, v, PLAIN.delta)
 
 
-def smallest(found):
-    return curvature(ReducedProgram(found.space, found.delta), found.v).smallest
-
-
 def test_below_a_saddle_lies_an_optimum(saddle):
     assert saddle.optimal
     assert saddle.objective == pytest.approx(-0.04614, abs=2e-5)
     below = leave_saddle(saddle)
-    assert smallest(below) > 0
+    assert curvature(ReducedProgram(below.space, below.delta), below.v).smallest > 0
     assert below.objective < 2 * saddle.objective
 
 

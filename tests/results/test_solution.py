@@ -163,10 +163,6 @@ GAIT = Fourier(np.array([0.4, 0.3]), np.array([[1.0], [0.2]]), np.array([[0.1], 
 FINE = {"delta": DELTA, "tolerance": 1e-8, "instants": 400}
 
 
-def begun_at(phase):
-    return lambda t: GAIT(t + phase)
-
-
 def replayed(path=GAIT, turn=0.0):
     return replay(BODY, FRICTION, path, turn=turn, **FINE)
 
@@ -213,9 +209,8 @@ def test_a_period_turns_about_a_point_and_the_chord_is_that_of_the_mean_circle()
 
 def test_the_chord_does_not_depend_on_the_phase_that_a_period_is_begun_at():
     turn = replayed().rotation
-    chords, displacements = (
-        [replayed(begun_at(p), at).distance for p in (0, 0.13, 0.37, 0.71)] for at in (turn, 0.0)
-    )
+    begun = [lambda t, p=phase: GAIT(t + p) for phase in (0, 0.13, 0.37, 0.71)]
+    chords, displacements = ([replayed(path, at).distance for path in begun] for at in (turn, 0.0))
     assert np.ptp(displacements) > 0.01 * max(displacements)
     np.testing.assert_allclose(chords, chords[0], rtol=1e-9)
 

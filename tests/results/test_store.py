@@ -26,17 +26,12 @@ from colloc.system.row_file import read_rows
 QUICK = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-5)
 
 
-@pytest.fixture(scope="module")
-def quick(once):
-    return once("quick of files", lambda: solve(QUICK, 1))
-
-
 @pytest.mark.parametrize("place", ["/", "motion/t", "data"])
 def test_a_result_to_which_somebody_added_something_is_not_lost_when_the_problem_is_solved_again(
-    place, quick, tmp_path
+    place, once, tmp_path
 ):
     """A remark, or measured data; changed numbers of its own are found by `colloc verify`."""
-    path = tmp_path / "quick.h5"
+    quick, path = once("quick of files", lambda: solve(QUICK, 1)), tmp_path / "quick.h5"
     for again in (save_result(quick, path), save_result(quick, path)):
         assert again[0].former is None
     with h5py.File(path, "a") as file:

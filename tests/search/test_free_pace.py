@@ -8,7 +8,6 @@ import pytest
 
 import colloc
 from colloc.commands.solve import summary_lines
-from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.regime import Regime
 from colloc.pictures.export import mjcf
 from colloc.reduced.motion import ReducedMotion
@@ -125,19 +124,15 @@ def uphill(**fields):
     return colloc.Problem("gliding", LEANING, **(usual | fields))
 
 
-def motion_of(stated):
-    space, v = space_near(stated, LEANING)
-    return ReducedMotion(control_problem(stated).dynamics, space.mesh, space), v
-
-
 def replayed(**slope):
     regime = Regime(**slope)
     return with_inertia(BODY, FRICTION, LEANING, DELTA, 0.1, tolerance=1e-6, regime=regime)
 
 
 def test_a_collocated_period_is_the_one_that_is_followed_from_instant_to_instant():
-    motion, v = motion_of(uphill(towards=0.4, intervals=120))
-    collocated, followed = motion.values(v, DELTA), replayed(grade=0.2, towards=0.4)
+    space, v = space_near(uphill(towards=0.4, intervals=120), LEANING)
+    collocated = ReducedMotion(space.control.dynamics, space.mesh, space).values(v, DELTA)
+    followed = replayed(grade=0.2, towards=0.4)
     for name in ("distance", "work", "rotation"):
         assert collocated[name] == pytest.approx(followed.values[name], abs=2e-5)
 

@@ -181,14 +181,12 @@ PROBLEMS = [
 ]
 
 
-@pytest.fixture
-def at_once(monkeypatch):
-    """What is found is written as it appears."""
-    monkeypatch.setattr("colloc.search.checkpoint.OPTIONS", SearchOptions(checkpoint_interval=0.0))
-
-
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
-def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(problem, tmp_path, at_once):
+def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(
+    problem, tmp_path, monkeypatch
+):
+    # what is found is written as it appears
+    monkeypatch.setattr("colloc.search.checkpoint.OPTIONS", SearchOptions(checkpoint_interval=0.0))
     path = tmp_path / "x.run.sqlite"
     first = Run(path, problem)
     with first.active(np.inf):

@@ -116,20 +116,12 @@ def test_a_gait_that_turns_is_as_far_whether_its_certificate_knows_the_objective
     assert measured == pytest.approx(known, rel=1e-4)
 
 
-@pytest.fixture(scope="module")
-def from_the_answer():
-    """One foot on each of three links, as `colloc solve --front` does it."""
-    best = solve(FEET)
-    return best, pareto_front(FEET, best=best)
-
-
-FEET = Problem("feet", body=Chain(feet=1), gait=Harmonic(1, "bilateral"), delta=1e-3)
-
-
 @pytest.mark.slow
-def test_from_the_answer_to_the_farthest_none_is_dominated_and_all_differ(from_the_answer):
-    best, front = from_the_answer
-    farthest = solve(FEET.with_(objective="distance"))
+def test_from_the_answer_to_the_farthest_none_is_dominated_and_all_differ():
+    """One foot on each of three links, as `colloc solve --front` does it."""
+    feet = Problem("feet", body=Chain(feet=1), gait=Harmonic(1, "bilateral"), delta=1e-3)
+    best, farthest = solve(feet), solve(feet.with_(objective="distance"))
+    front = pareto_front(feet, best=best)
     assert front.points[-1] is best
     assert front.values[0, 0] == pytest.approx(farthest.distance, rel=1e-4)
     assert 4 <= len(front.points) <= 8

@@ -111,11 +111,6 @@ TEXTS = ["", "1", "ä", "Reibung \N{GREEK SMALL LETTER MU}_t / µ_f", "tab\tand\
 TEXTS += ["\N{SNAKE}" * 500]
 
 
-@pytest.fixture(scope="module")
-def samples(solved, tmp_path_factory):
-    return Samples(tmp_path_factory.mktemp("kinds"), solved("three_link")[0])
-
-
 def returned(path, value):
     """What a dataset and an attribute give back."""
     with new_file(path) as file:
@@ -155,9 +150,10 @@ def test_numbers_round_trip_with_their_types(tmp_path, value):
 
 
 @pytest.mark.parametrize("kind", HDF5_KINDS)
-def test_a_damaged_file_is_refused_in_a_sentence_or_read(samples, kind, tmp_path):
+def test_a_damaged_file_is_refused_in_a_sentence_or_read(three_link, kind, tmp_path):
     """Cut, or with one byte in 20 exchanged; HDF5's own checksums cover what describes the data."""
-    data, rng = samples.write(kind).read_bytes(), np.random.default_rng(1)
+    samples, rng = Samples(tmp_path / "kinds", three_link), np.random.default_rng(1)
+    data = samples.write(kind).read_bytes()
     damaged = [data[:-1], data[: len(data) // 2], data[:10], b"", b"no HDF5", bytes(8) + data[8:]]
     for begin in rng.integers(len(data) - 100, size=20):
         damaged.append(data[:begin] + rng.bytes(100) + data[begin + 100 :])
