@@ -68,6 +68,7 @@ _SIGNATURES = {
     "colloc_balance": "ppdlippppp",
     "colloc_motion": "ppppp",
     "colloc_momenta": "pdpipp",
+    "colloc_balances": "pdpp",
     "colloc_repeating": "pdnippppppp",
     "colloc_period": "nippppdp" + "ppdpdpppp",
     "colloc_period_vjp": "nippppdp" + "ppippp",
@@ -96,7 +97,11 @@ def library() -> ctypes.CDLL | None:
         if multiprocessing.parent_process() is None:  # workers leave it to their parent
             warnings.warn(_SLOW, SlowWarning, stacklevel=2)
         return None
-    for name in ("colloc_period", "colloc_period_vjp"):  # of as many lanes as the processor has
+    for name in (
+        "colloc_period",
+        "colloc_period_vjp",
+        "colloc_balances",
+    ):  # of as many lanes as the processor has
         setattr(built, name, built[f"{name}_{built.colloc_lanes()}"])
     built.colloc_shape_functions.argtypes = [_TYPES[each] for each in "inppppnpppp"]
     return with_signatures(built, _SIGNATURES)
@@ -182,3 +187,13 @@ def kernel_repeating(
     found = states, start, values, converged
     call_for_all(library.colloc_repeating, moving, *settings, *found, piece=n_time)
     return states, values, bool(converged[0])
+
+
+def kernel_balances(
+    library: ctypes.CDLL, moving: Moving, start: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Balanced velocities ``(3, n_time)`` by Newton's method from `start`, several time points side
+    by side, and where there are any ``(n_time,)``; digits are lost at links that rest."""
+    z, lost = np.empty(start.shape), np.empty(start.shape[1], dtype=np.int64)
+    call_for_all(library.colloc_balances, moving, start, tolerance, z, lost)
+    return z, lost == 0

@@ -27,6 +27,7 @@ from colloc.mechanics.damped_newton import groups
 from colloc.mechanics.densities import Instants, Quantity
 from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.law import Law
+from colloc.mechanics.native_kernel import kernel_balances, native_kernel
 from colloc.system.errors import NotConvergedError
 
 FORWARDS, BACKWARDS = 1, -1
@@ -113,19 +114,31 @@ def _solve(
     is found, or a repeated one."""
     count, n_time = starts.shape[0], starts.shape[2]
     tiled = moving.at(np.tile(np.arange(n_time), count))
-    start = np.concatenate(list(starts), axis=1)
+    z, largest = np.concatenate(list(starts), axis=1), _largest_rate(moving.rates)
+
+    def repeated(found: np.ndarray) -> np.ndarray:
+        each = np.where(found, z, np.nan).reshape(3, count, n_time).transpose(1, 0, 2)
+        return _repeat(each, largest).ravel()
+
+    unsolved = np.arange(z.shape[1])
+    library = native_kernel(moving.body, moving.friction)
+    if library is not None and method == "direct" and moving.load is None:
+        # most starts lead to one velocity, which is solved for to all digits once
+        near, found = kernel_balances(library, tiled, z, _TOLERANCE)
+        z[:, found] = near[:, found]
+        unsolved = np.flatnonzero(~repeated(found))
+    part, sign = tiled.at(unsolved), np.zeros(z.shape[1])
     solved = solve_balance(
-        *tiled[:5], load=tiled.load, start=start, tolerance=_TOLERANCE, method=method
+        *part[:5], load=part.load, start=z[:, unsolved], tolerance=_TOLERANCE, method=method
     )
-    z = np.stack(np.split(solved.z, count, axis=1))
-    found = ((solved.residual <= _ACCEPTED) | solved.converged).reshape(count, -1)
-    repeated = _repeat(np.where(found[:, None], z, np.nan), _largest_rate(moving.rates))
-    new, sign = np.flatnonzero(found & ~repeated), np.zeros(solved.anchor.size)
+    z[:, unsolved], found = solved.z, np.zeros(z.shape[1], dtype=bool)
+    found[unsolved] = (solved.residual <= _ACCEPTED) | solved.converged
+    new = np.flatnonzero((found & ~repeated(found))[unsolved])
     for link, chosen in groups(solved.anchor[new]):  # seen from what rests, which loses no digits
         at = new[chosen]
-        jacobian = _jacobian(tiled.at(at), solved.anchor_velocity[:, at], link)
-        sign[at] = np.sign(np.linalg.det(jacobian))
-    return z, sign.reshape(count, -1)
+        jacobian = _jacobian(part.at(at), solved.anchor_velocity[:, at], link)
+        sign[unsolved[at]] = np.sign(np.linalg.det(jacobian))
+    return z.reshape(3, count, n_time).transpose(1, 0, 2), sign.reshape(count, -1)
 
 
 def _jacobian(moving: Moving, z: np.ndarray, reference: int | None = TAIL) -> np.ndarray:

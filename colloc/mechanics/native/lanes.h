@@ -27,6 +27,7 @@
 #define pull_to_shape NAMED(pull_to_shape)
 #define colloc_period NAMED(colloc_period)
 #define colloc_period_vjp NAMED(colloc_period_vjp)
+#define colloc_balances NAMED(colloc_balances)
 #define Vector3 NAMED(Vector3)
 #define Matrix3 NAMED(Matrix3)
 #define PartSliding NAMED(PartSliding)

@@ -334,3 +334,24 @@ int colloc_period_vjp(
     free(turned), free(room.memory);
     return done(&played, ready);
 }
+
+/* Velocities in balance (3, n_time) from `start` (3, n_time), side by side; `lost` (n_time): 1 where none is found. */
+int colloc_balances(CHAIN, const double *start, double tolerance, double *z, long long *lost)
+{
+    Played played = PLAYED;
+    Room room = {0};
+    const bool ready = new_room(&played) && new_lanes(&room, n, &played.law);
+    for (ptrdiff_t t = first; t < last && ready; t += LANES) {
+        Vector3 velocity;
+        Lanes own_delta;
+        const Lanes speed = lane_instants(&played, &room, t, start, velocity, &own_delta);
+        const Mask at_rest = lane_balance(n, &room, &played.law, own_delta, tolerance, velocity);
+        tail_velocity(room.link, room.k, velocity);
+        for (int i = 0; i < 3; ++i)
+            lane_store(z + i * n_time, t, last, velocity[i] * speed);
+        for (int i = 0; i < LANES && t + i < last; ++i)
+            lost[t + i] = !at_rest[i];
+    }
+    free(room.memory);
+    return done(&played, ready);
+}
