@@ -236,12 +236,6 @@ MAX_TORQUE = option(
 )
 
 
-def problem_changes(options: argparse.Namespace) -> dict[str, Any]:
-    return {
-        name: x for name in map(_attribute, CHANGES) if (x := getattr(options, name)) is not None
-    }
-
-
 def _attribute(option: Option) -> str:
     name, settings = option
     return settings.get("dest", name[2:].replace("-", "_"))
@@ -262,7 +256,8 @@ def read_problem(
     from colloc.gaits.problem_file import read_problem_file
 
     stated = read_problem_file(options.problem)
-    changes = problem_changes(options)
+    asked = values(options, *map(_attribute, CHANGES))
+    changes = {name: value for name, value in asked.items() if value is not None}
     problem = stated.problem.with_(**changes) if changes else stated.problem
     if start is None:
         return stated, problem

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 from colloc.commands import main as cli
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import EFFICIENCY
-from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, Reference, read_problem_file
 from colloc.gaits.regime import Free
 from colloc.gaits.robot import Robot
@@ -137,9 +136,6 @@ def init(options: argparse.Namespace) -> int:
         )
     if path.suffix != ".py":
         raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
-    # raises for a name that files cannot have
-    body = Chain(tuple(length / whole for length in lengths), feet=options.feet or 0)
-    Problem(path.stem, body=body)
     mu = options.mu or (model and model.mu) or 1.0
     robot, wheels = _stated_robot(options, model), bool(options.wheels)
     feet = options.feet or ""
@@ -215,7 +211,6 @@ def _stated_robot(options: argparse.Namespace, model: Model | None) -> dict[str,
         )
     period = robot["period"]
     robot["period"] = period[0] if len(period) == 1 else tuple(period)
-    Robot(**robot)
     return robot
 
 
