@@ -320,12 +320,6 @@ def pareto(options: argparse.Namespace) -> int:
     cli.NO_FIGURE,
 )  # fmt: skip
 def steer(options: argparse.Namespace) -> int:
-    if not all(abs(turn) < 180 for turn in (*options.turn, *options.spot)) or 0 in options.spot:
-        raise ProblemError(
-            "--turn and --spot take degrees between -180 and 180, --spot not 0: by more a body "
-            "could turn the other way."
-        )
-
     stated, table, starts = _begin(options, "steer.json")
 
     def find(say: Callable[..., None]) -> Steering:
