@@ -48,6 +48,7 @@ MACHINE = {
     r"(?m)^(python|colloc|casadi|numpy|scipy|h5py)\n\d\S*$": r"\1 ...",
     r"colloc \d\S*": "colloc ...",
     r"\d+\.\d+\n\d+\.\d s in all": "... s in all",
+    r"(?m)^seconds\n\S+\n\S+$": "seconds ...",
     r"(?m)^(seconds +|iterations +|intervals +)\d.*": r"\1...",
 }
 """What no two machines print alike."""
@@ -131,10 +132,28 @@ def film(name, beside=None):
 
 
 @also
-def page(name, lines=None):
-    """Words of the report, or so many lines of them, but for the drawings."""
-    words = words_of(report_page(state(name), gap="  upper bound 1")).splitlines()
+def page(name, lines=None, beside=None):
+    """Words of the report, or so many lines of them, but for the drawings; of a front, too, with
+    another result beside it."""
+    more = {"front": front_of(name, beside), "beside": state(beside)} if beside else {}
+    words = words_of(report_page(state(name), gap="  upper bound 1", **more)).splitlines()
     return "\n".join(words[: int(lines or len(words))])
+
+
+def front_of(*names):
+    # copies, for commands say of members of a family which file stated them
+    points = tuple(replace(state(name)) for name in names)
+    gaps = (Gap(0, "The best gaits are those beside it.", True),)
+    aims = Objective("distance"), points[0].problem.objective
+    return ParetoFront(points[0].problem, aims, points, gaps)
+
+
+@also
+def rest(name, *phases):
+    """Heading and place of a body that was at rest at phase 0."""
+    motion = state(name).from_rest(np.array(phases, dtype=float))
+    rows = zip(motion.t, motion.theta, *motion.centre, strict=True)
+    return "\n".join(", ".join(f"{x:.5f}" for x in row) for row in rows)
 
 
 @also
@@ -195,11 +214,7 @@ def described(figure):
 
 @also
 def pareto():
-    # copies, for commands say of members of a family which file stated them
-    ends = replace(state("robot")), replace(state("small"))
-    gaps = (Gap(0, "The best gaits are those beside it.", True),)
-    aims = Objective("distance"), ends[0].problem.objective
-    front = ParetoFront(ends[0].problem, aims, ends, gaps)
+    front = front_of("robot", "small")
     with patch("colloc.studies.families.pareto_front", return_value=front):
         colloc("pareto", "loop.py", "--no-figure")
     again = read_front(Path("results/loop.front.csv"), front.problem)
