@@ -56,7 +56,7 @@ _NAMES = {
     "search.certify": "certify",
     "verification.replay": "replay",
     "verification.differential_motion": "slope_motion motion_from_rest",
-    "dynamics.slow_enough": "slow_enough",
+    "dynamics.dynamics": "slow_enough",
     "mechanics.fixed_point": "solve_balance",
     "system.errors": "CollocError NotConvergedError ProblemError StoreError",
 }

@@ -43,7 +43,7 @@ from colloc.search.certify import certify as certify
 from colloc.verification.replay import replay as replay
 from colloc.verification.differential_motion import slope_motion as slope_motion
 from colloc.verification.differential_motion import motion_from_rest as motion_from_rest
-from colloc.dynamics.slow_enough import slow_enough as slow_enough
+from colloc.dynamics.dynamics import slow_enough as slow_enough
 from colloc.mechanics.fixed_point import solve_balance as solve_balance
 from colloc.system.errors import (
     CollocError as CollocError,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc.dynamics.slow_enough import SCHEME, efficiency_at
+from colloc.dynamics.dynamics import SCHEME, efficiency_at
 from colloc.gaits.regime import Regime
 from colloc.mechanics.inertia import momentum_rates
 from colloc.numerics.mesh import Mesh
