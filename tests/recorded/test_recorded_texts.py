@@ -251,7 +251,17 @@ def printed(line, capsys):
     text = "".join(capsys.readouterr()) + text
     for pattern, instead in MACHINE.items():
         text = re.sub(pattern, instead, text)
+    text = NUMBER.sub(lambda number: shortened(number[0]), text)
     return [each.rstrip() for each in text.strip("\n").splitlines()]
+
+
+def shortened(number):
+    """A number with no more digits than are compared, and none of rounding."""
+    value = float(number.replace("−", "-"))
+    if "e-" in number and abs(value) < OF_MACHINE:
+        return "0"
+    long = "." in number and len(number.strip("+-−0.").replace(".", "")) > 7
+    return f"{value:.6g}" if long else number
 
 
 def same(found, known):
