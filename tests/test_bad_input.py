@@ -329,7 +329,7 @@ driven(gears=((1, 0), (0, 1))) -> 2 rows, and the chain has 3 joints
 driven(gears=((1, 0), (0, 1), (0, 0))) -> joint 2 .* hangs on no motor
 driven(gears=((1, 0), (0, 1), (1, 1)), stuck={2: 0.0}) -> is stuck, and hangs on a motor
 driven(gears=((1, 1), (1, 1), (1, 1))) -> two motors do the same
-driven(gears="belts") | driven(gears=3) -> a row of numbers for each joint
+driven(gears="belts") | driven(gears=3) -> gears must be
 driven(stuck=5) | driven(stuck=[1, 2]) -> stuck gives joints and their angles
 driven(stuck=[(1, 0.1), (1, 0.2)]) -> each is named once
 driven(ModalBody(3)) -> joints of a Chain
@@ -355,9 +355,9 @@ efficiency_bound(*AT, 4.0) -> joint_limit
 efficiency_bound(Chain((1 / 6,) * 6), Friction(), 2.0) -> 5 links
 fitted_friction("nowhere.csv") -> cannot read .*nowhere.csv
 fitted_friction(np.ones((2, 3))) -> a row for each of at least 3 speeds
-fitted_friction([[0.1, 0.5, 0.9], [0.2, np.nan, 0.9], [0.3, 0.5, 0.9]]) -> sample 2: along is nan
-fitted_friction([[0.1, 0.5, 0.9], [0.2, "rough", 0.9], [0.3, 0.5, 0.9]]) -> sample 2: along is 'rough'
-fitted_friction([[0.1, 0.5, 0.9], [0.2, None, 0.9], [0.3, 0.5, 0.9]]) -> sample 2: along is None
+fitted_friction([[0.1, 0.5, 0.9], [0.2, np.nan, 0.9], [0.3, 0.5, 0.9]]) -> table of friction must be a finite
+fitted_friction([[0.1, 0.5, 0.9], [0.2, "rough", 0.9], [0.3, 0.5, 0.9]]) -> table of friction must be numbers
+fitted_friction([[0.1, 0.5, 0.9], [0.2, None, 0.9], [0.3, 0.5, 0.9]]) -> table of friction must be a finite
 fitted_friction(SAMPLES, length=1.0) -> take both
 fitted_friction(SAMPLES, length=-1.0, period=2.0) -> length
 Problem("x", friction=DRAG, gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
@@ -377,7 +377,7 @@ OwnLaw("-vs.real", "-vn") -> is no formula that can be differentiated
 OwnLaw("__import__('os')", "-vn") -> is no formula|uses
 OwnLaw("-vs**vs", "-vn") -> exponent
 evaluate(PROBLEM, np.zeros((3, 20))) -> angles of 3 joints, and the body has 2
-evaluate(PROBLEM, np.full((2, 20), np.nan)) -> no finite angle of joint 1 at sample 1
+evaluate(PROBLEM, np.full((2, 20), np.nan)) -> must be a finite 2-D array
 evaluate(PROBLEM, GAIT.angles(np.arange(20) / 60)) -> does not close
 evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=0) -> period must be positive
 evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=0.06) -> in the file's unit of time

@@ -24,7 +24,6 @@ from colloc.gaits.gait import (
     NONE,
     SYMMETRIES,
     GaitFunction,
-    finite_array,
     fraction,
     solved_phases,
     symmetric_samples,
@@ -32,7 +31,7 @@ from colloc.gaits.gait import (
 from colloc.gaits.harmonic import Harmonic, series_of
 from colloc.gaits.linear import LinearClass
 from colloc.numerics.mesh import Mesh
-from colloc.system.arguments import STATED_IF_SET, is_whole, named_arguments
+from colloc.system.arguments import STATED_IF_SET, finite_array, is_whole, named_arguments
 from colloc.system.csv_table import csv_table
 from colloc.system.errors import ProblemError
 

@@ -14,7 +14,7 @@ from colloc.gaits.gait import BILATERAL, NONE
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.linear import LinearClass
 from colloc.mechanics.densities import JointMap
-from colloc.system.arguments import is_number, is_whole, named_arguments
+from colloc.system.arguments import finite_array, is_number, is_whole, named_arguments
 from colloc.system.errors import ProblemError
 
 
@@ -77,16 +77,9 @@ class Coupled(LinearClass):
                 f"{stuck!r}."
             )
         object.__setattr__(self, "stuck", tuple((int(joint), float(a)) for joint, a in pairs))
-        if isinstance(gears, (tuple, list)) and not gears:
-            object.__setattr__(self, "gears", ())
-            return
-        try:
-            table = np.array(gears, dtype=float)
-        except (TypeError, ValueError, OverflowError):
-            table = np.empty(0)
-        if table.ndim != 2 or not table.shape[1] or not np.isfinite(table).all():
-            raise ProblemError("gears must be a row of numbers for each joint, one for each motor.")
-        object.__setattr__(self, "gears", tuple(map(tuple, table.tolist())))
+        if not isinstance(gears, (tuple, list)) or gears:
+            gears = tuple(map(tuple, finite_array("gears", gears, 2).tolist()))
+        object.__setattr__(self, "gears", tuple(gears))
 
     def joint_map(self, n_joint: int) -> JointMap:
         return _joint_map(self, n_joint)

@@ -21,6 +21,7 @@ from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.record import FEWEST, LARGEST, Column, Record, read_record
 from colloc.mechanics.chain import Chain
+from colloc.system.arguments import finite_array
 from colloc.system.errors import ProblemError
 
 _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
@@ -115,13 +116,13 @@ def fitted_gait(
     elif callable(source):
         time, period = _PHASES, 1.0
         function = source.angles if isinstance(source, GaitFunction) else source
-        angles = _numbers(name, function(time))
+        angles = finite_array(name, function(time), 2)
     elif {"joint"} < set(getattr(source, "dims", ())):  # labelled, as `Solution.to_xarray` has them
         labelled = cast(Any, source).transpose("joint", ...)
-        angles = _numbers(name, labelled)
+        angles = finite_array(name, labelled, 2)
         time = np.asarray(labelled[labelled.dims[-1]], dtype=float)
     else:
-        angles = _numbers(name, source)
+        angles = finite_array(name, source, 2)
         time = np.arange(angles.shape[1], dtype=float)
     if (count := len(angles)) != n_joint:
         raise ProblemError(
@@ -129,6 +130,8 @@ def fitted_gait(
         )
     if isinstance(source, Fourier):
         return FittedGait(source)
+    if angles.shape[1] < FEWEST:
+        raise ProblemError(f"{name} must have angles at {FEWEST} times or more.")
     if record is None and degrees:
         angles = np.radians(angles)
     elif record is None and (largest := np.abs(angles).max()) > LARGEST:
@@ -155,25 +158,6 @@ def _with_path(fitted: FittedGait, samples: _Samples, path: np.ndarray) -> Fitte
     steps = np.hypot(x - path[0, 0, : begin.size], y - path[0, 1, : begin.size])
     went = float(steps.mean()) if begin.size else 0.0
     return replace(fitted, path=path[..., time <= fitted.period + 0.5 * step], went=went)
-
-
-def _numbers(name: str, source: object) -> np.ndarray:
-    try:
-        angles = np.array(source, dtype=float)
-    except (TypeError, ValueError):
-        raise ProblemError(
-            f"{name} must be joint angles, a number for each joint and time, not "
-            f"{type(source).__name__}."
-        ) from None
-    if angles.ndim != 2 or angles.shape[1] < FEWEST:
-        raise ProblemError(
-            f"{name} must have a row for each joint and a column for each of at least {FEWEST} "
-            f"times."
-        )
-    if not np.isfinite(angles).all():
-        joint, k = np.argwhere(~np.isfinite(angles))[0]
-        raise ProblemError(f"{name} has no finite angle of joint {joint + 1} at sample {k + 1}.")
-    return angles
 
 
 class _Fit(NamedTuple):

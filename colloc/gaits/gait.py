@@ -15,8 +15,6 @@ import numpy as np
 
 from colloc.mechanics.densities import JointMap
 from colloc.mechanics.inertia import GRAVITY
-from colloc.system.arguments import shown
-from colloc.system.errors import ProblemError
 
 _DENSE = np.linspace(0.0, 1.0, 2001)
 DELTA_START = 0.01
@@ -111,18 +109,6 @@ class GaitFunction:
 def delta_per_period(gait_class: Any, gait: GaitFunction, delta: float) -> float:
     """Convert delta in the units of a class to body lengths per period of a gait."""
     return delta * gait.length if gait_class.relative_delta else delta
-
-
-def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
-    """Convert to an array of so many dimensions. `ProblemError` unless all squares are finite."""
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        raise ProblemError(f"{name} must be numbers, not {shown(value)}.") from None
-    largest = np.sqrt(np.finfo(float).max) / (array.size + 1)
-    if array.ndim != ndim or not (np.abs(array) < largest).all():
-        raise ProblemError(f"{name} must be a finite {ndim}-D array.")
-    return array
 
 
 NONE, BILATERAL, ANTIPODAL = SYMMETRIES = ("none", "bilateral", "antipodal")

@@ -26,13 +26,18 @@ from colloc.gaits.gait import (
     NONE,
     GaitFunction,
     both_halves,
-    finite_array,
     symmetric_samples,
 )
 from colloc.gaits.linear import LinearClass, largest_coordinate
 from colloc.mechanics.bodies import Body
 from colloc.numerics.arrays import Array, namespace
-from colloc.system.arguments import STATED_IF_SET, check_finite, is_whole, named_arguments
+from colloc.system.arguments import (
+    STATED_IF_SET,
+    check_finite,
+    finite_array,
+    is_whole,
+    named_arguments,
+)
 from colloc.system.errors import ProblemError
 
 SAME_START = 1e-9

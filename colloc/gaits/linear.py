@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from colloc.gaits.gait import BILATERAL, NONE, SYMMETRIES, GaitFunction, finite_array, fraction
+from colloc.gaits.gait import BILATERAL, NONE, SYMMETRIES, GaitFunction, fraction
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import JointMap
 from colloc.numerics.mesh import Mesh
-from colloc.system.arguments import STATED_IF_SET, named_arguments
+from colloc.system.arguments import STATED_IF_SET, finite_array, named_arguments
 from colloc.system.errors import ProblemError
 
 _SERIES, _START_SERIES = 64, 2

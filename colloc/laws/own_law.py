@@ -25,7 +25,7 @@ from colloc.mechanics.friction import Friction, regularised_speed
 from colloc.mechanics.law import Matrix
 from colloc.numerics.arrays import Array
 from colloc.numerics.expression import Formula, formula
-from colloc.system.arguments import check_finite, check_positive, named_arguments
+from colloc.system.arguments import check_finite, check_positive, finite_array, named_arguments
 from colloc.system.csv_table import csv_table
 from colloc.system.errors import ProblemError
 
@@ -367,13 +367,9 @@ def _read_table(table: Any) -> tuple[str, np.ndarray]:
         name = str(table)
         names, values = csv_table(Path(table), _FEWEST)
     else:
-        cells = np.array(table, dtype=object)
-        if cells.ndim != 2 or len(cells) < _FEWEST:
+        values = finite_array(name, table, 2)
+        if len(values) < _FEWEST:
             raise ProblemError(f"{name} must have a row for each of at least {_FEWEST} speeds.")
-        values = np.vectorize(_number, otypes=[float])(cells)
-        for k, j in np.argwhere(~np.isfinite(values)):
-            what = f"{[*_NAMES, 'more'][min(j, 4)]} is {cells[k, j]!r}"
-            raise ProblemError(f"{name}, sample {k + 1}: {what}, and must be a finite number.")
     if not names:
         if values.shape[1] not in (3, 4):
             raise ProblemError(
@@ -391,13 +387,6 @@ def _read_table(table: Any) -> tuple[str, np.ndarray]:
             )
         order += found[:1]
     return name, values[:, order]
-
-
-def _number(cell: Any) -> float:
-    try:
-        return float(cell)
-    except (TypeError, ValueError):
-        return np.nan
 
 
 def _check(name: str, speed: np.ndarray, coefficients: np.ndarray) -> None:

@@ -9,14 +9,7 @@ import numpy as np
 
 from colloc.dynamics.collocated import CollocatedPose, whole_turns
 from colloc.dynamics.control_problem import control_problem
-from colloc.gaits.gait import (
-    ANTIPODAL,
-    BILATERAL,
-    NONE,
-    delta_per_period,
-    finite_array,
-    solved_phases,
-)
+from colloc.gaits.gait import ANTIPODAL, BILATERAL, NONE, delta_per_period, solved_phases
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.mechanics.balance import load_wrench
@@ -26,6 +19,7 @@ from colloc.mechanics.inertia import about_centre, checked_mass, turning
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.results.motion import RigidMotion, SampledMotion, rotate
+from colloc.system.arguments import finite_array
 from colloc.transcription.layout import RADIANS, Layout, layout_of
 
 REDUCED, PRESCRIBED, EVALUATED = "reduced", "prescribed", "evaluated"

@@ -194,6 +194,18 @@ def is_whole(value: object, least: float = -math.inf, most: float = math.inf) ->
     return whole and bool(least <= value <= most)  # type: ignore[operator]
 
 
+def finite_array(name: str, value: object, ndim: int) -> np.ndarray:
+    """Convert to an array of so many dimensions. `ProblemError` unless all squares are finite."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ProblemError(f"{name} must be numbers, not {shown(value)}.") from None
+    largest = np.sqrt(np.finfo(float).max) / (array.size + 1)
+    if array.ndim != ndim or not (np.abs(array) < largest).all():
+        raise ProblemError(f"{name} must be a finite {ndim}-D array.")
+    return array
+
+
 def check_finite(positive: bool = False, **numbers: object) -> None:
     """Raise a `ProblemError` for the first number that is not finite (and positive)."""
     for name, value in numbers.items():
