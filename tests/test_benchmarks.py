@@ -155,7 +155,7 @@ PROGRAMS = [path for path in MODULES if starts_itself(path) and path.stem not in
 
 @pytest.mark.parametrize("path", PROGRAMS, ids=name_of)
 @pytest.mark.parametrize(("option", "code"), [("--help", 0), ("--no-such-option", 2)])
-def test_a_program_answers_help_before_it_does_anything_and_refuses_what_it_does_not_understand(
+def test_a_program_answers_help_and_refuses_others(
     path, option, code, tmp_path, monkeypatch, capfd
 ):
     needed(path)

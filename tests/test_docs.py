@@ -254,9 +254,7 @@ def results_of_a_reader(three_link, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("page", RUN)
-def test_the_python_of_a_page_runs_from_top_to_bottom_and_prints_what_the_page_says(
-    page, results_of_a_reader, capsys
-):
+def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, results_of_a_reader, capsys):
     """In one namespace, with no name that the page does not define: as a reader types it."""
     capsys.readouterr()
     names = {"__name__": "__main__"}

@@ -75,9 +75,7 @@ def test_in_a_browser_no_page_is_too_wide_dark_is_dark_and_the_search_finds(prog
 
 
 @pytest.mark.slow
-def test_a_checker_of_accessibility_finds_nothing_serious_in_a_report(
-    program, three_link, tmp_path
-):
+def test_a_checker_of_accessibility_finds_no_fault_in_a_report(program, three_link, tmp_path):
     axe = ROOT / "build/package/axe.min.js"
     if not axe.exists():
         pytest.skip("there is no build/package/axe.min.js: npm pack axe-core, as .ci/run does")

@@ -121,9 +121,7 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
         ("x.json", {"max_speed": [2, 1], "rate": 20}, ["--max-speed", "2", "1", "--rate", "20"]),
     ],
 )
-def test_a_gait_is_exported_from_python_as_by_the_command(
-    name, settings, words, three_link, tmp_path
-):
+def test_a_gait_is_exported_by_python_as_by_commands(name, settings, words, three_link, tmp_path):
     colloc.save(three_link, tmp_path / "x.h5")
     stated = three_link.export(tmp_path / name, **settings)
     assert stated["period_s"] * stated["rate_hz"] == stated["samples_per_period"]

@@ -98,9 +98,7 @@ def test_the_referee_takes_a_result_and_holds_it(best, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_without_a_table_the_referee_begins_a_copy_of_its_own_where_it_is_called(
-    best, tmp_path, monkeypatch
-):
+def test_without_a_table_the_referee_begins_a_copy_where_it_is_called(best, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     colloc.save(best, "quick.h5")
     arguments = ["--add", "quick.h5", "--by", "colloc solve quick.py"]

@@ -8,16 +8,9 @@ import numpy as np
 import pytest
 
 from colloc import Chain, Friction
+from colloc.bounds import sampled
 from colloc.bounds.motions import CoulombMotion, Domain, admissible
-from colloc.bounds.sampled import (
-    Bound,
-    Budget,
-    PotentialSpace,
-    Samples,
-    TensorSpline,
-    compute_bound,
-    efficiency_bound,
-)
+from colloc.bounds.sampled import Samples, TensorSpline, efficiency_bound
 from research import small_gaits
 from research.guarantee.potential_range import potential_space
 from research.small_gaits import balanced_motion, best_small_gait, small_gait
@@ -25,13 +18,13 @@ from scripts.check_potential import Kept, keep, largest_ratio, potentials
 from tests.shared.cases import slow
 from tests.shared.mechanics import coulomb
 
-ODD = Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)
+ODD = sampled.Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)
 DIRECTED = dataclasses.replace(ODD, harmonics=(0, 1))
 STEPS = 48
 
 
 @cache
-def bound_of(mu: tuple[float, float, float]) -> Bound:
+def bound_of(mu: tuple[float, float, float]) -> sampled.Bound:
     friction = coulomb(*mu)
     return efficiency_bound(Chain(), friction, budget=ODD if friction.reversible else DIRECTED)
 
@@ -212,8 +205,10 @@ LIMIT = 2.5
 @pytest.fixture(scope="module")
 def found():
     domain = Domain(Chain(), Friction(), LIMIT)
-    space = PotentialSpace(TensorSpline(2, LIMIT, 4), (1,), True)
-    return space, *compute_bound(domain, Budget(4, (1,), 10, 24, 4, 20, 1e-2, first=4))
+    space = sampled.PotentialSpace(TensorSpline(2, LIMIT, 4), (1,), True)
+    return space, *sampled.compute_bound(
+        domain, sampled.Budget(4, (1,), 10, 24, 4, 20, 1e-2, first=4)
+    )
 
 
 def efficiency(measure):
@@ -283,8 +278,8 @@ def test_a_potential_is_checked_by_samples_that_were_not_chosen_for_it(found):
 
 @pytest.mark.slow
 def test_more_knots_lower_the_program(found):
-    budget = Budget(6, (1,), 10, 24, 8, 40, 1e-2, first=4)
-    more, _ = compute_bound(Domain(Chain(), Friction(), LIMIT), budget)
+    budget = sampled.Budget(6, (1,), 10, 24, 8, 40, 1e-2, first=4)
+    more, _ = sampled.compute_bound(Domain(Chain(), Friction(), LIMIT), budget)
     assert more.intervals == 6
     assert more.graded
     assert more.floor < found[1].floor - 1e-3

@@ -11,18 +11,10 @@ from scipy.optimize import linprog
 
 import colloc
 from colloc import Chain, Foot, Friction, Harmonic, ModalBody, Problem, ProblemError, solve_balance
+from colloc.bounds import sampled
 from colloc.bounds.motions import CoulombMotion, Domain, fundamental, two_resting
 from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
-from colloc.bounds.sampled import (
-    Budget,
-    PotentialSpace,
-    Samples,
-    TensorSpline,
-    bound_key,
-    efficiency_bound,
-    largest_gain,
-    smallest_maximum,
-)
+from colloc.bounds.sampled import Budget, Samples, TensorSpline, efficiency_bound
 from colloc.mechanics.balance import instant, total_power
 from research.small_gaits import balanced_motion, small_gait
 from tests.shared.mechanics import coulomb
@@ -135,14 +127,14 @@ def test_largest_gain_is_the_maximum_over_heading(harmonics):
     brute = np.max(
         [np.real(sum(np.exp(1j * k * t) * a for k, a in amplitudes.items())) for t in theta], axis=0
     )
-    gain, heading = largest_gain(amplitudes)
+    gain, heading = sampled.largest_gain(amplitudes)
     np.testing.assert_allclose(gain, brute, rtol=1e-4)
     at = np.real(sum(np.exp(1j * k * heading) * a for k, a in amplitudes.items()))
     np.testing.assert_allclose(at, gain, rtol=1e-12)
 
 
 def test_rows_are_the_gain_and_its_derivatives():
-    space = PotentialSpace(TensorSpline(2, np.pi, 4), (0, 1, 2), True)
+    space = sampled.PotentialSpace(TensorSpline(2, np.pi, 4), (0, 1, 2), True)
     motion = balanced_motion(Chain(), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3), *random_points(6, 60))
     samples = Samples(space, motion)
     free = 0.1 * np.random.default_rng(7).standard_normal(space.size)
@@ -160,7 +152,7 @@ def test_rows_are_the_gain_and_its_derivatives():
 def test_mirror_images_and_end_swap_move_alike(mu, lengths):
     friction, body, rng = coulomb(*mu), Chain(lengths), np.random.default_rng(9)
     q, r = rng.uniform(-2.0, 2.0, (body.n_joint, 80)), rng.normal(size=(body.n_joint, 80))
-    space = PotentialSpace(
+    space = sampled.PotentialSpace(
         TensorSpline(body.n_joint, 2.0, 4), (1,) if friction.reversible else (0, 1), body.symmetric
     )
     free = 0.1 * np.random.default_rng(10).standard_normal(space.size)
@@ -215,7 +207,7 @@ def test_two_links_with_directed_friction_can_and_obey_the_coefficient_bound():
 def test_minimax_program_agrees_with_a_simplex_solver():
     rng = np.random.default_rng(15)
     rows, constants = rng.standard_normal((60, 8)), rng.uniform(0.0, 1.0, 60)
-    best = smallest_maximum(sparse.csr_matrix(rows), constants, sparse.csr_matrix((8, 8)))
+    best = sampled.smallest_maximum(sparse.csr_matrix(rows), constants, sparse.csr_matrix((8, 8)))
     left = np.hstack([rows, -np.ones((60, 1))])
     simplex = linprog(
         np.eye(9)[8], A_ub=left, b_ub=-constants, bounds=(None, None), method="highs-ds"
@@ -292,7 +284,7 @@ def test_bound_is_cached_by_all_inputs(tmp_path, monkeypatch):
     assert "gap 0.1000" in first.report(first.sampled - 0.1)
     assert "not certified between" in first.report(0.3)
     keys = {
-        bound_key(Domain(b, f, a), tiny)
+        sampled.bound_key(Domain(b, f, a), tiny)
         for b in (Chain(), Chain((0.3, 0.4, 0.3)))
         for f in (Friction(), Friction(mu_t=2.0), colloc.Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0))
         for a in (2.0, 2.5)
@@ -390,9 +382,7 @@ def test_no_bound_is_taken_or_computed_for_other_bodies_and_laws(changes, tmp_pa
         upper_bound(problem, tmp_path, compute=True)
 
 
-def test_a_tighter_bound_is_offered_where_one_can_be_computed_and_nowhere_else(
-    tmp_path, monkeypatch
-):
+def test_a_tighter_bound_is_offered_where_one_can_be_computed_alone(tmp_path, monkeypatch):
     monkeypatch.setattr("colloc.bounds.sampled.efficiency_bound", lambda *domain, cache: "computed")
     for body in (*(Chain((1 / n,) * n) for n in (3, 5, 6, 9)), ModalBody(2)):
         problem = Problem("other", body=body, gait=Harmonic(1, "antipodal"))

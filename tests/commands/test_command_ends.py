@@ -79,9 +79,7 @@ def python(*words, stdout=subprocess.PIPE, **options):
         ("numpy", "colloc solve quick.py"), ("casadi", "colloc solve quick.py"),
     ],
 )  # fmt: skip
-def test_ctrl_c_while_libraries_are_imported_ends_without_a_traceback(
-    module, words, quick, tmp_path
-):
+def test_ctrl_c_while_libraries_are_imported_leaves_no_traceback(module, words, quick, tmp_path):
     """The signal comes from inside the import; at numpy as in a dataclass that is made, where
     Python would end the process by the signal, whatever the command returned."""
     pressed = "import signal; signal.raise_signal(signal.SIGINT)"
@@ -128,9 +126,7 @@ def test_letters_that_an_encoding_lacks_are_printed_as_words(encoding, three_lin
     assert shown in printed.getvalue().decode(encoding)
 
 
-def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning_and_not_the_bound(
-    quick, tmp_path, monkeypatch
-):
+def test_a_cache_of_bounds_that_cannot_be_written_costs_a_warning(quick, tmp_path, monkeypatch):
     problem = read_problem_file(quick).problem
     # anything with fields
     monkeypatch.setattr("colloc.bounds.sampled.compute_bound", lambda *_: (problem.friction, None))
@@ -173,9 +169,7 @@ def test_a_figure_that_cannot_be_drawn_costs_no_summary(solve, tmp_path):
 
 
 @pytest.mark.parametrize("words", [[], slow(["--json"])])
-def test_a_result_that_cannot_be_saved_is_told_and_the_run_kept(
-    words, solve, tmp_path, monkeypatch
-):
+def test_a_result_that_cannot_be_saved_is_told_the_run_is_kept(words, solve, tmp_path, monkeypatch):
     def full(*_):
         raise StoreError("cannot write quick.h5: No space left on device.")
 

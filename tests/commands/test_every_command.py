@@ -173,9 +173,7 @@ def test_a_good_problem_is_solved_saved_and_drawn(tmp_path, capsys):
     assert "delta had to be lowered from 0.3" in printed
 
 
-def test_a_failed_solve_is_kept_apart_and_never_replaces_a_good_result(
-    tmp_path, capsys, monkeypatch
-):
+def test_a_failed_solve_is_kept_apart_and_replaces_no_good_result(tmp_path, capsys, monkeypatch):
     (tmp_path / "p.py").write_text(GOOD, encoding="utf-8")
     good = tmp_path / "quick.h5"
     good.write_bytes(b"a good result")

@@ -207,9 +207,7 @@ def test_an_mjcf_counts_angles_from_its_reference_and_the_stated_mass_of_a_body_
     assert problem.body.weights == pytest.approx([0.25, 0.5, 0.25])
 
 
-def test_friction_of_an_mjcf_is_that_of_geoms_on_the_floor_and_what_is_not_taken_is_said(
-    tmp_path, capsys
-):
+def test_friction_of_an_mjcf_is_that_of_geoms_on_the_floor_what_is_left_is_said(tmp_path, capsys):
     """Of two geoms that touch, MuJoCo takes the larger coefficient; one that is not stated is 1."""
     floor = SWIMMER.replace('<geom type="plane"', '<geom type="plane" friction="0.2"')
     slippery = floor.replace('<geom type="capsule"', '<geom type="capsule" friction="0.4 0.01"')

@@ -53,9 +53,7 @@ NUMBERS.remove("instants")
 
 
 @pytest.mark.parametrize("name", NUMBERS)
-def test_every_number_of_a_certificate_is_held_against_a_new_one(
-    name, three_link, tmp_path, capsys
-):
+def test_each_number_of_a_certificate_is_held_against_a_new_one(name, three_link, tmp_path, capsys):
     path = save(three_link, tmp_path / "x.h5")
     with h5py.File(path, "r+") as file:  # as anybody can
         numbers = file["certificate"].attrs
@@ -99,9 +97,7 @@ def test_what_is_no_number_of_a_replay_is_held_against_it_too(three_link, tmp_pa
         (Friction(), (0.2, 0.5, 0.3), {"backwards"}),
     ],
 )
-def test_gaits_are_compared_where_start_phase_and_the_symmetries_of_body_and_friction_bring_them_nearest(
-    friction, lengths, alike
-):
+def test_gaits_are_compared_where_phase_and_symmetries_bring_them_nearest(friction, lengths, alike):
     mean, cos, sin = np.array([0.3, -0.1]), np.array([[1.0], [0.2]]), np.array([[0.1], [0.8]])
     problem = Problem("p", body=Chain(lengths), friction=friction)
 

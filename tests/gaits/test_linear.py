@@ -231,9 +231,7 @@ def test_rates_are_the_derivative_of_angles():
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
 @pytest.mark.parametrize("n_joint", [1, 2, 3, 4])
 @pytest.mark.parametrize("harmonics", [1, 2, 3, 4])
-def test_members_have_the_symmetry_of_their_class_its_highest_harmonic_and_their_parameters(
-    harmonics, n_joint, symmetry
-):
+def test_members_have_the_symmetry_and_last_harmonic_of_their_class(harmonics, n_joint, symmetry):
     gait_class = harmonics_within(harmonics, symmetry)
     p = np.random.default_rng(2).normal(size=gait_class.size(n_joint))
     gait = gait_class.member(p, n_joint)

@@ -71,9 +71,7 @@ def test_friction_is_the_sum_over_the_points_that_touch(law, body):
 @pytest.mark.parametrize("size", [0.0, 0.3])
 @each_body
 @each_dry_law
-def test_in_balance_no_force_is_left_and_joints_do_the_work_of_friction_less_the_load_s(
-    law, body, size
-):
+def test_in_balance_no_force_is_left_and_joints_do_what_the_load_does_not(law, body, size):
     angles, rates = random_instants(20, n_joint=body.n_joint)
     held = size * body.law(law).smallest
     load, at = held * random_loads(20, 1.0), (body, law, angles, rates, 1e-3)
@@ -170,9 +168,7 @@ def test_casadi_says_the_same(law, body):
 
 
 @pytest.mark.parametrize("name", ["weights", "offset"])
-def test_the_stiffness_of_an_associated_law_is_symmetric_and_its_dissipation_has_the_force_as_gradient(
-    name,
-):
+def test_an_associated_law_has_a_symmetric_stiffness_and_the_force_as_gradient(name):
     """Reciprocity: a push here moves there as one there moves here."""
     body, law, (angles, rates) = BODIES[name], ELLIPTIC, random_instants(20)
     z, delta = np.random.default_rng(1).normal(size=(3, 20)), np.full((1, 20), 0.1)

@@ -11,20 +11,8 @@ import pytest
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, ellipse, replay, solve
 from colloc.bounds.motions import admissible
 from colloc.dynamics.control_problem import control_problem
-from colloc.mechanics.contact import (
-    CLEARANCE_SMOOTHING,
-    SMOOTHING,
-    crossing_depth,
-    ends_and_links,
-    far_contact,
-    far_pairs,
-    lacking_width,
-    overlapping_pairs,
-    passing_depth,
-    share_of_first,
-    smooth_minimum,
-    tangent_of_minimum,
-)
+from colloc.mechanics import contact as touching
+from colloc.mechanics.contact import crossing_depth, far_pairs, overlapping_pairs, passing_depth
 from colloc.search.optimise import crossing_pairs, last_free
 from colloc.transcription.full_program import FullProgram
 from colloc.transcription.shape_constraints import near_peaks, shape_checks
@@ -47,7 +35,7 @@ def test_bounds_never_allow_a_crossing_and_forbid_little_else(lengths):
     allowed = excess <= 0
     crossing = crossing_depth(body, angles) > 0
     assert not np.any(allowed & crossing)
-    exact = excess <= 0.5 * SMOOTHING + 1e-9
+    exact = excess <= 0.5 * touching.SMOOTHING + 1e-9
     assert np.array_equal(exact[~allowed] | crossing[~allowed], np.ones((~allowed).sum(), bool))
     assert (crossing.mean() > 0.02) == (lengths[0] + lengths[2] > lengths[1])
 
@@ -75,9 +63,9 @@ def test_the_gap_between_links_is_that_of_their_points():
     known = np.maximum(wide.width - naive, 0.0)
     assert np.abs(lacks - known)[~crossing].max() < 0.35 / 200
     # what a search bounds, of every end and every link but its own
-    assert len(ends_and_links(wide)) == 4 * 3
-    for end, link in ends_and_links(wide):
-        lacking, w = lacking_width(wide, end, link).pair(angles)[0][0], wide.width
+    assert len(touching.ends_and_links(wide)) == 4 * 3
+    for end, link in touching.ends_and_links(wide):
+        lacking, w = touching.lacking_width(wide, end, link).pair(angles)[0][0], wide.width
         naive = np.hypot(*(points[link] - ends[:, end, :, None])).min(axis=1)
         np.testing.assert_allclose(np.sqrt(w**2 - 2 * w * lacking), naive, atol=0.35 / 200)
 
@@ -89,11 +77,17 @@ def test_two_links_cannot_cross():
 
 def test_the_tangent_planes_of_the_minimum_lie_above_it_and_touch():
     rng = np.random.default_rng(2)
-    first, second = rng.normal(size=(2, 500)) * 3 * SMOOTHING
-    share, least, step = share_of_first(first, second), smooth_minimum(first, second), 1e-8
-    np.testing.assert_allclose(tangent_of_minimum(first, second, share), least, atol=1e-15)
-    assert np.all(tangent_of_minimum(first, second, rng.permutation(share)) >= least - 1e-15)
-    ahead, behind = (smooth_minimum(first + side * step, second) for side in (1, -1))
+    first, second = rng.normal(size=(2, 500)) * 3 * touching.SMOOTHING
+    share, least, step = (
+        touching.share_of_first(first, second),
+        touching.smooth_minimum(first, second),
+        1e-8,
+    )
+    np.testing.assert_allclose(touching.tangent_of_minimum(first, second, share), least, atol=1e-15)
+    assert np.all(
+        touching.tangent_of_minimum(first, second, rng.permutation(share)) >= least - 1e-15
+    )
+    ahead, behind = (touching.smooth_minimum(first + side * step, second) for side in (1, -1))
     slope = (ahead - behind) / (2 * step)
     np.testing.assert_allclose(share, slope, atol=1e-6)
 
@@ -277,7 +271,7 @@ def crossing(body, angles, i, j):
 
 def clearance(body, angles, i, j):
     """The smooth function that is not negative only where the links do not cross."""
-    return -far_contact(body, i, j).excess(angles)
+    return -touching.far_contact(body, i, j).excess(angles)
 
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda b: f"{b.n_link} links")
@@ -290,7 +284,7 @@ def test_clearance_never_allows_a_crossing_and_forbids_little_else(body):
         cross = crossing(body, angles, i, j)
         seen += cross.sum()
         assert not (cross & (value >= 0)).any()
-        assert (cross | (value >= -2 * CLEARANCE_SMOOTHING)).all()
+        assert (cross | (value >= -2 * touching.CLEARANCE_SMOOTHING)).all()
     assert seen > 20
     assert len(far_pairs(body)) == (body.n_link - 2) * (body.n_link - 3) // 2
 

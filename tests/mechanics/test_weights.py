@@ -34,9 +34,7 @@ def test_a_nearly_weightless_head_neither_holds_nor_moves_the_body():
 
 
 @pytest.mark.parametrize("mu", [(1, 1, 3), (1, 3, 1), (3, 1, 2)], ids=str)
-def test_the_largest_forces_are_reached_by_links_that_slide_along_or_across_themselves_or_turn_about_an_end(
-    mu,
-):
+def test_the_largest_forces_are_reached_by_links_that_slide_along_across_or_turn(mu):
     body, law, straight = Chain(LENGTHS, weights=WEIGHTS), coulomb(*mu), np.zeros((2, 3))
     most = body.contact.largest_forces(law).ravel()
     along, across, couples = np.split(most, 3)

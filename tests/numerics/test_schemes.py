@@ -72,9 +72,7 @@ def test_peaks_are_found_inside_and_at_ends(power, off):
 
 
 @pytest.mark.parametrize(("at", "multiplier", "added"), [(0, 1, 1), (np.pi, 1, 0), (np.pi, -1, 1)])
-def test_a_row_gains_curvature_from_a_peak_that_moves_and_none_from_a_lowest_value(
-    at, multiplier, added
-):
+def test_a_row_gains_curvature_from_a_peak_that_moves_not_from_a_valley(at, multiplier, added):
     """cos(t - v) is 1 at its peak, whatever v is; held at t = v its curvature is -1."""
     t = at + 1e-3 * np.array([[-1.0], [0.0], [1.0]])
     found = curvature_of_moving(np.full(1, multiplier), np.cos(t), np.sin(t)[..., None])

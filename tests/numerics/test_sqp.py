@@ -107,9 +107,7 @@ def test_steps_that_lead_away_from_what_a_row_asks_for_are_cut():
     ("least_at", "bound", "v", "on_edge"),
     [(0.6, 1, 0.6, False), (2, 1, 0.9, True), (-2, 1, -0.1, True), (2, 0.7, 0.7, False)],
 )
-def test_only_the_box_has_an_edge_and_the_bounds_of_a_program_have_none(
-    least_at, bound, v, on_edge
-):
+def test_only_the_box_has_an_edge_the_bounds_of_a_program_have_none(least_at, bound, v, on_edge):
     for way in (1, -1):
         value, slope = (lambda x, c=way * least_at, n=n: (x - c) ** n / n for n in (2, 1))
         mirrored = of_one(lambda x, value=value: value(x)[0], slope, -bound, bound)

@@ -109,9 +109,7 @@ def test_mp4_plays(three_link, tmp_path):
     assert probe.stdout.strip() == "300,10"
 
 
-def test_without_ffmpeg_an_mp4_is_refused_before_anything_is_drawn(
-    three_link, tmp_path, monkeypatch, capsys
-):
+def test_without_ffmpeg_an_mp4_is_refused_before_drawing(three_link, tmp_path, monkeypatch, capsys):
     file = save(three_link, tmp_path / "x.h5")
     monkeypatch.setenv("PATH", str(tmp_path))
     assert main([str(file), "--format", "mp4"]) == 2

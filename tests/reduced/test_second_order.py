@@ -157,9 +157,7 @@ def found():
 
 
 @pytest.mark.parametrize(("beyond", "kept"), [(0.0, False), (1e-7, False), (1e-4, True)])
-def test_what_ipopt_finds_is_the_answer_only_where_its_checks_rest(
-    found, monkeypatch, beyond, kept
-):
+def test_what_ipopt_finds_is_the_answer_where_its_checks_rest(found, monkeypatch, beyond, kept):
     """Up to what a certificate lets pass; else the gait of the search is, if it satisfies the
     first-order conditions."""
     place = ReducedProgram.place_rows

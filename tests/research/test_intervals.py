@@ -193,9 +193,7 @@ def cubic(t, i, x, degree=DEGREE):
     )
 
 
-def test_what_is_stated_of_a_harmonic_and_of_its_gain_holds_what_they_are_in_fractions(
-    potential, cells
-):
+def test_what_is_stated_of_a_harmonic_and_its_gain_holds_them_in_fractions(potential, cells):
     points, z = cells.points[:, ::5], motions_at(cells.points[:, ::5]).velocity
     knots = [Fraction(x) for x in potential.spline.extend]
     for k, c in potential.c.items():

@@ -150,9 +150,7 @@ def test_joint_speeds_are_those_of_the_problem(failures, three_link):
     judged("joint speed", run)
 
 
-def test_a_least_value_is_missed_by_no_more_than_the_mesh_may_be_wrong(
-    failures, three_link, replays
-):
+def test_a_least_value_is_missed_by_no_more_than_a_mesh_may_err(failures, three_link, replays):
     """The replay's distance counts: who asks for as much has it, who asks for more has not."""
     there = replays[max(replays)].distance
 
@@ -250,9 +248,7 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly():
     )
 
 
-def test_other_balanced_motions_count_in_the_error_and_explain_a_gap(
-    failures, three_link, replays, monkeypatch
-):
+def test_other_motions_count_as_error_and_explain_gaps(failures, three_link, replays, monkeypatch):
     """Up to 1 % that the law leaves open may pass, stated in every error."""
     fine = replays[max(replays)]
 

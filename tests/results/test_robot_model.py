@@ -87,9 +87,7 @@ def test_a_model_has_the_energy_and_the_centre_of_mass_of_the_robot(write, links
     assert moment == pytest.approx(SIZE["mass"] * size * centre, rel=1e-6)
 
 
-def test_every_contact_has_the_coefficients_of_its_own_foot_along_and_across(
-    uneven, unsolved, tmp_path
-):
+def test_every_contact_has_the_coefficients_of_its_foot_both_ways(uneven, unsolved, tmp_path):
     directed = Foot(1, friction=Friction(mu_t=3, mu_f=4, mu_b=1))
     body = Chain(feet=(Foot(0), directed, Wheel(2, rolling=0.04, sideways=1.0)))
     other = {"body": body, "friction": Friction(9, 9, 9), "joint_limit": 3.0}
@@ -149,9 +147,7 @@ PADS = tuple(Pad(link, 0.25, 0.75) for link in range(3))
     ],
     ids=["lying", "feet", "wheels", "turned wheels", "axles", "pads"],
 )
-def test_a_file_moves_in_mujoco_as_it_is_written_as_colloc_says(
-    body, mu_t, gait, unsolved, tmp_path
-):
+def test_a_file_moves_in_mujoco_as_it_is_as_colloc_says(body, mu_t, gait, unsolved, tmp_path):
     gait, friction = colloc.ellipse(*gait), Friction(mu_t=mu_t, mu_f=1, mu_b=1)
     solution = unsolved(Problem("moves", gait, body, friction, Harmonic(1), delta=1e-3))
     size = {"length": 1.04, "mass": 2.0, "period": 1.5}

@@ -140,9 +140,7 @@ def test_the_centre_of_mass_goes_round_a_circle_of_the_radius_that_is_stated(tur
     assert f"turns {abs(np.degrees(turning.rotation)):.4g}°" in turning.turning
 
 
-def test_the_tour_of_the_readme_works_on_a_failed_solution_and_certifies_nothing(
-    three_link, tmp_path
-):
+def test_the_tour_of_the_readme_works_on_a_failed_solution_uncertified(three_link, tmp_path):
     failed = colloc.Solution(three_link.problem, replace(three_link.answer, optimal=False))
     again = load(save(failed, tmp_path / "failed.h5"))
     for solution in (failed, again):

@@ -27,9 +27,7 @@ QUICK = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_toleran
 
 
 @pytest.mark.parametrize("place", ["/", "motion/t", "data"])
-def test_a_result_to_which_somebody_added_something_is_not_lost_when_the_problem_is_solved_again(
-    place, once, tmp_path
-):
+def test_a_result_to_which_somebody_added_something_is_not_lost(place, once, tmp_path):
     """A remark, or measured data; changed numbers of its own are found by `colloc verify`."""
     quick, path = once("quick of files", lambda: solve(QUICK, 1)), tmp_path / "quick.h5"
     for again in (save_result(quick, path), save_result(quick, path)):
@@ -116,9 +114,7 @@ def test_round_trip_keeps_everything(three_link, tmp_path):
     np.testing.assert_array_equal(again.sample(t).tail, three_link.sample(t).tail)
 
 
-def test_an_answer_met_among_gaits_larger_than_the_problems_own_guess_is_read_back(
-    three_link, tmp_path
-):
+def test_an_answer_among_gaits_larger_than_the_guess_is_read_back(three_link, tmp_path):
     """The search may go on among gaits that are faster than the usual first guess."""
     gait = three_link.gait
     larger = three_link.answer.problem.with_(smallest_shape_speed=gait.shape_speed, guess=gait)
@@ -131,9 +127,7 @@ def test_an_answer_met_among_gaits_larger_than_the_problems_own_guess_is_read_ba
 
 
 @pytest.mark.parametrize("name", ["distance", "work_error", "value_at_zero_delta", "value"])
-def test_a_certificate_without_one_of_its_numbers_or_with_several_for_one_is_refused(
-    name, three_link, tmp_path
-):
+def test_a_certificate_that_lacks_a_number_or_has_several_is_refused(name, three_link, tmp_path):
     path, said = save(three_link, tmp_path / "x.h5"), f"attribute {name} of /certificate is missing"
     with h5py.File(path, "a") as file:
         del file["certificate"].attrs[name]
@@ -194,9 +188,7 @@ def test_the_result_of_another_problem_is_kept_under_another_name(changes, three
     assert values(tmp_path) == {"x.h5": 0.9, "x.former-1.h5": 0.2}
 
 
-def test_a_better_answer_to_the_same_question_is_kept_and_a_worse_or_equal_one_replaced(
-    three_link, tmp_path
-):
+def test_a_better_answer_to_the_same_question_is_kept_no_worse_or_equal_one(three_link, tmp_path):
     path = tmp_path / "x.h5"
     pairs = (0.2, None), (0.3, None), (0.3 - 1e-9, None), (0.25, 1), (0.3, None), (0.1, 1)
     for value, former in pairs:
@@ -249,9 +241,7 @@ def test_what_cannot_be_read_is_kept(three_link, tmp_path):
 
 
 @pytest.mark.parametrize("linked", [True, False])
-def test_where_the_new_result_cannot_be_written_all_stays_as_it_was(
-    linked, three_link, tmp_path, monkeypatch
-):
+def test_where_no_result_can_be_written_all_stays(linked, three_link, tmp_path, monkeypatch):
     path = tmp_path / "x.h5"
     save_result(replace(valued(three_link, 0.2), shrunk=valued(three_link, 0.1)), path)
     (tmp_path / "x.png").write_bytes(b"its figure")

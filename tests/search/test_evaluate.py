@@ -153,9 +153,7 @@ def test_kept_and_loaded_it_is_the_same(evaluated, tmp_path):
     assert cost == pytest.approx(1 / evaluated.efficiency, rel=1e-4)
 
 
-def test_the_command_saves_a_result_that_compare_holds_against_the_best(
-    tmp_path, monkeypatch, capsys, evaluated
-):
+def test_the_command_saves_what_compare_takes(tmp_path, monkeypatch, capsys, evaluated):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "p.py").write_text("from colloc import *\nPROBLEM = Problem('p', delta=1e-3)\n")
     own = colloc.Fourier(GAIT.mean, 0.8 * GAIT.cos, 0.8 * GAIT.sin)
@@ -266,9 +264,7 @@ def test_an_exported_gait_states_no_error_of_its_samples_whatever_its_columns(ex
     assert "uncertain" not in again.message
 
 
-def test_servos_that_stand_about_90_degrees_are_refused_before_the_replay_where_links_cross(
-    tmp_path,
-):
+def test_servos_about_90_degrees_are_refused_before_the_replay_where_links_cross(tmp_path):
     five = colloc.Problem("five", body=colloc.Chain((0.2,) * 5))
     wave = np.degrees(0.7 * np.sin(2 * np.pi * T - np.arange(4)[:, None]))
     path = written(tmp_path / "servo.csv", T, 90 + wave, "t_s,s1_deg,s2_deg,s3_deg,s4_deg")

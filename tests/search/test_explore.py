@@ -26,9 +26,7 @@ UNEQUAL = Problem(
 
 
 @pytest.mark.slow
-def test_the_answer_is_the_best_gait_of_finite_size_and_a_better_one_that_shrank_is_kept_beside_it(
-    tmp_path,
-):
+def test_the_answer_is_the_best_gait_of_finite_size_beside_a_better_one_that_shrank(tmp_path):
     solution = solve(UNEQUAL)
     assert solution.status == "solved"
     assert not on_speed_floor(solution.problem, solution.gait)
@@ -75,9 +73,7 @@ def test_where_gaits_shrink_the_search_goes_on_among_those_that_a_person_sees_mo
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("feet", "least"), [(1, 1.666), (0, 1.192)], ids=["feet", "lying"])
-def test_four_links_whose_twitch_is_best_get_a_gait_that_one_sees_and_that_is_as_good_as_other_known_ones(
-    feet, least
-):
+def test_four_links_whose_twitch_is_best_get_a_gait_that_one_sees_as_good_as_known(feet, least):
     """On feet the best bilateral gait, which the class contains, has 1.666; lying the fastest for
     its path has 1.192."""
     friction = Friction(0.3, 0.3, 0.3)
@@ -132,9 +128,7 @@ def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkey
         (32, range(32), 0.0, 32),  # as many as were asked for
     ],
 )
-def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(
-    monkeypatch, asked, meeting, froude, tried
-):
+def test_the_search_ends_once_starts_met_the_best_often(monkeypatch, asked, meeting, froude, tried):
     numbers = itertools.count()
 
     def sketch(problem, gait, is_new, deltas, known):
@@ -168,9 +162,7 @@ def test_the_search_ends_once_new_starts_have_met_the_best_gait_often(
         ([(1.0, False), (0.9, False), (0.8, False), (0.7, True)], 3),
     ],
 )
-def test_gaits_are_solved_for_until_a_certificate_holds_and_no_other_promises_more(
-    monkeypatch, ends, solved_for
-):
+def test_gaits_are_solved_for_until_one_holds_and_none_promises_more(monkeypatch, ends, solved_for):
     """Gaits promise 1, 0.9, 0.8, 0.7 before their meshes are refined."""
     asked = []
 
@@ -186,9 +178,7 @@ def test_gaits_are_solved_for_until_a_certificate_holds_and_no_other_promises_mo
     assert (len(found), len(asked)) == (solved_for, solved_for)
 
 
-def test_where_no_certificate_holds_gaits_that_were_left_are_followed_and_the_best_of_them_is_the_answer(
-    monkeypatch,
-):
+def test_where_no_certificate_holds_the_best_of_gaits_that_were_left_is_the_answer(monkeypatch):
     """The first three of all followed fail; what comes of others is another gait, at the final
     delta."""
     problem, asked = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2), []

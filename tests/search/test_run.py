@@ -68,9 +68,7 @@ class Stop:
 
 
 @pytest.mark.parametrize("number", slow_but([8], [1, 3, 5, 8, 12, 14]))
-def test_a_solve_that_is_interrupted_anywhere_goes_on_to_the_same_file(
-    undisturbed, tmp_path, monkeypatch, number
-):
+def test_an_interrupted_solve_goes_on_to_the_same_file(undisturbed, tmp_path, monkeypatch, number):
     file, wanted = undisturbed
     path = tmp_path / "quick.h5"
     with monkeypatch.context() as patch:
@@ -182,9 +180,7 @@ PROBLEMS = [
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
-def test_what_is_kept_is_read_back_to_the_last_bit_and_goes_on_alike(
-    problem, tmp_path, monkeypatch
-):
+def test_what_is_kept_is_read_back_to_the_bit_and_goes_on_alike(problem, tmp_path, monkeypatch):
     # what is found is written as it appears
     monkeypatch.setattr("colloc.search.checkpoint.OPTIONS", SearchOptions(checkpoint_interval=0.0))
     path = tmp_path / "x.run.sqlite"
@@ -214,9 +210,7 @@ def test_solves_on_two_threads_end_as_one_after_another():
         assert found.certificate == alone.certificate
 
 
-def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_again(
-    tmp_path, capsys
-):
+def test_a_run_of_another_problem_or_a_damaged_one_is_named_fresh_begins_again(tmp_path, capsys):
     from colloc.commands.solve import solve as main
 
     (tmp_path / "quick.py").write_text(FILE.replace("delta=1e-3", "delta=0.1"), encoding="utf-8")
@@ -235,9 +229,7 @@ def test_a_run_of_another_problem_and_a_damaged_one_are_named_and_fresh_begins_a
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits")
-def test_a_solve_on_a_full_disk_says_so_prints_its_answer_and_keeps_what_was_there(
-    undisturbed, tmp_path
-):
+def test_a_solve_on_a_full_disk_prints_its_answer_and_keeps_what_was_there(undisturbed, tmp_path):
     """No file may grow, which a write meets as it meets a full disk."""
     import resource
 

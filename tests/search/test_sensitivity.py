@@ -111,9 +111,7 @@ def test_slopes_on_a_finer_mesh_differ_by_no_more_than_the_errors(name, finer, s
         assert effect.error < 5e-3 * abs(effect.slope), effect.name
 
 
-def test_a_slope_that_changes_with_the_step_of_differences_is_off_by_no_more_than_its_error(
-    three_link, monkeypatch
-):
+def test_a_slope_that_changes_with_the_step_is_off_by_at_most_its_error(three_link, monkeypatch):
     """As where something else begins within a few steps: the derivative at the number itself is
     that of friction sideways."""
     plain = {each.name: each for each in parameters(three_link.problem)}["friction sideways"]
@@ -249,9 +247,7 @@ def test_what_is_no_optimum_is_refused(three_link, tmp_path):
         three_link.sensitivity()["colour"]
 
 
-def test_the_error_of_a_slope_is_the_most_that_it_differs_by_on_another_mesh(
-    three_link, monkeypatch
-):
+def test_the_error_of_a_slope_is_the_most_it_differs_by_on_another_mesh(three_link, monkeypatch):
     """Meshes on which a problem is worth so many times its friction sideways."""
     on = [lambda problem, n=n: n * problem.friction.mu_t for n in (3.0, 2.6, 3.1)]
     monkeypatch.setattr("colloc.search.sensitivity._on_meshes", lambda answer: on)

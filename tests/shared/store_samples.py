@@ -6,18 +6,7 @@ import numpy as np
 
 from colloc import Axis, Fourier, Harmonic, Problem, Study, ellipse, load, save
 from colloc.results.archive import Archive, Outcome, StartName, open_archive
-from colloc.studies.sweep import (
-    KIND,
-    NAME,
-    VERSION,
-    Attempt,
-    StudyRun,
-    Visit,
-    append_visits,
-    read_journal,
-    save_study,
-    study_table,
-)
+from colloc.studies import sweep as studies
 from colloc.system.row_file import CACHE, put_rows, read_rows
 from colloc.system.store_file import Table, array, attribute, open_file
 from scripts.paper.study import read_arrays, write_arrays
@@ -45,17 +34,19 @@ def archive(path, starts=range(3)) -> Archive:
 
 
 def record(k=0):
-    return Visit(problem(1.0 + 0.01 * k).hash, (Attempt("warm", f"key{k}", outcome(k)),))
+    return studies.Visit(
+        problem(1.0 + 0.01 * k).hash, (studies.Attempt("warm", f"key{k}", outcome(k)),)
+    )
 
 
 def table(folder):
     study = Study(
         "sample", (Axis("x", (1.0, 1.5)), Axis("kind", ("a", "b"))), lambda x, kind: problem(x)
     )
-    run = StudyRun(study, folder)
+    run = studies.StudyRun(study, folder)
     for k, state in enumerate(map(run.state, study.cells())):
-        state.attempts.append(Attempt("warm", "key", outcome(k)))
-    return study_table(run)
+        state.attempts.append(studies.Attempt("warm", "key", outcome(k)))
+    return studies.study_table(run)
 
 
 class Samples:
@@ -66,7 +57,7 @@ class Samples:
 
     def path(self, kind: str) -> Path:
         return self.folder / {
-            "journal": NAME,
+            "journal": studies.NAME,
             "cache": "bounds.sqlite",
             "archive": "archive.sqlite",
         }.get(kind, f"{kind}.h5")
@@ -83,9 +74,9 @@ class Samples:
             arrays = {"a/b": np.arange(2000.0) + version, "names": np.array(["d", "W"])}
             write_arrays(path, arrays, units={})
         elif kind == "study":
-            save_study(self.table, path, source=str(version) * 10)
+            studies.save_study(self.table, path, source=str(version) * 10)
         elif kind == "journal":
-            append_visits(
+            studies.append_visits(
                 self.folder,
                 [record(5 + version)] if path.exists() else [record(k) for k in range(5)],
             )
@@ -110,13 +101,13 @@ class Samples:
                 name: repr(values.tolist()) for name, values in found.variables.items()
             }
         if kind == "journal":
-            return sorted(a.key for r in read_journal(path.parent) for a in r.attempts)
+            return sorted(a.key for r in studies.read_journal(path.parent) for a in r.attempts)
         return read_rows(path, CACHE)
 
 
 def load_study(path):
     """The table that `save_study` wrote. `StoreError` if it cannot be read."""
-    with open_file(path, KIND, VERSION) as file:
+    with open_file(path, studies.KIND, studies.VERSION) as file:
         columns = {name: array(file, name) for name in file}
         dims = {name: tuple(attribute(file[name], "dims").split(", ")) for name in file}
         attributes = {name: attribute(file, name) for name in file.attrs}

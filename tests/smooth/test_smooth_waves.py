@@ -260,9 +260,7 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
-def test_a_bump_lies_at_the_ends_of_its_region_where_it_grows_and_is_flattened_and_never_beyond(
-    share,
-):
+def test_a_bump_grows_and_is_flattened_at_the_ends_of_its_region_never_beyond(share):
     body = CrawlerBody(0.1, share=share)
     ends = body.breaks(np.array([[LAP, -LAP, 0.0, 0.4], *[[1.0] * 4] * body.modes]))[1:-1]
     np.testing.assert_allclose(ends[0, :2], 0.4, atol=1e-15)

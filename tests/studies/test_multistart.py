@@ -18,20 +18,8 @@ from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.contact import crossing_depth
-from colloc.results.archive import (
-    CRASHED,
-    ERROR,
-    TIME_LIMIT,
-    Archive,
-    Outcome,
-    StartName,
-    basins,
-    counts,
-    open_archive,
-    outcome_fields,
-    row_path,
-    save_archive,
-)
+from colloc.results import archive as archives
+from colloc.results.archive import ERROR, Archive, open_archive, save_archive
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.comparison import images, phase_distance, reversed_in_time
 from colloc.results.solution import SOLVED
@@ -61,11 +49,11 @@ def problem(**changes):
 
 def outcome(start, gait=GAIT, efficiency=0.2, status=SOLVED):
     numbers = 1e-7, 0.1, 0.5, 1e-4, 12, 1.5, 1.25, efficiency, 1e-7
-    return Outcome(start, status, "", gait, gait, efficiency, *numbers)
+    return archives.Outcome(start, status, "", gait, gait, efficiency, *numbers)
 
 
 def name(start, seed=0):
-    return StartName(SAMPLERS[0], seed, start)
+    return archives.StartName(SAMPLERS[0], seed, start)
 
 
 def replayed(gait, friction, instants=200):
@@ -153,11 +141,11 @@ def test_basins_join_images_of_one_gait_and_nothing_else():
     same = [outcome(k, shift_phase(image, 0.1 * k)) for k, image in enumerate(found)]
     other = outcome(20, Fourier(GAIT.mean + 0.3, GAIT.cos, GAIT.sin))
     better, failed = outcome(21, GAIT, 0.21), outcome(22, status=ERROR)
-    found = basins(stated, [*same, other, better, failed])
+    found = archives.basins(stated, [*same, other, better, failed])
     assert [b.best.efficiency for b in found] == [0.21, 0.2, 0.2]
     assert sorted(len(b.starts) for b in found) == [1, 1, 8]
     assert sum(b.frequency for b in found) == pytest.approx(10 / 11)
-    assert counts([*same, failed]) == {SOLVED: 8, ERROR: 1}
+    assert archives.counts([*same, failed]) == {SOLVED: 8, ERROR: 1}
 
 
 SPLINE = BSpline(6).member(np.linspace(0.1, 1.3, 12) ** 2, 2)
@@ -177,7 +165,9 @@ def test_an_archive_comes_back_to_the_bit_with_gaits_of_every_class(kind, gait, 
     assert back.outcomes.keys() == archive.outcomes.keys()
     for key, one in back.outcomes.items():
         assert type(one.gait) is type(gait)
-        assert repr(outcome_fields(one)) == repr(outcome_fields(archive.outcomes[key]))
+        assert repr(archives.outcome_fields(one)) == repr(
+            archives.outcome_fields(archive.outcomes[key])
+        )
     save_archive(back)
     assert sorted(p.name for p in path.parent.glob("[!.]*")) == ["a.h5", "a.sqlite"]
 
@@ -186,7 +176,7 @@ def test_an_archive_that_cannot_be_gone_on_from_is_refused_and_left_alone(tmp_pa
     path = tmp_path / "a.h5"
     for file, content, words in (
         (path, b"results of an older colloc", "choose another --output"),
-        (row_path(path), b"not SQLite" * 100, "cannot be read as a colloc starts"),
+        (archives.row_path(path), b"not SQLite" * 100, "cannot be read as a colloc starts"),
     ):
         file.write_bytes(content)
         with pytest.raises(StoreError, match=words):
@@ -229,7 +219,7 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
     assert (good.start, bad.start, slow.start) == (0, 1, 2)
     assert good.iterations > 0
     assert (bad.status, bad.message) == (ERROR, "ZeroDivisionError: one bad start")
-    assert slow.status == TIME_LIMIT
+    assert slow.status == archives.TIME_LIMIT
     assert "the last optimum was at delta = 1.0e-01" in slow.message
 
 
@@ -239,7 +229,10 @@ def test_a_start_without_time_for_its_first_step_ends_at_the_time_limit(monkeypa
 
     monkeypatch.setattr(campaign, "search_solve", silent)
     slow = campaign.run_guess(problem(), lambda: GAIT, 0, 1e-9)
-    assert (slow.status, slow.message) == (TIME_LIMIT, "gave up after 1e-09 s; no optimum yet.")
+    assert (slow.status, slow.message) == (
+        archives.TIME_LIMIT,
+        "gave up after 1e-09 s; no optimum yet.",
+    )
 
 
 def test_a_worker_that_dies_costs_one_start(monkeypatch):
@@ -250,7 +243,7 @@ def test_a_worker_that_dies_costs_one_start(monkeypatch):
     monkeypatch.setattr(campaign, "run_tasks", run_tasks)
     found = list(campaign.run_starts(Archive(problem()), range(6)))
     assert [o.start for o in found] == [0, 1, 2, 3, 4, 5]
-    assert [o.start for o in found if o.status == CRASHED] == [2]
+    assert [o.start for o in found if o.status == archives.CRASHED] == [2]
 
 
 def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, capsys, monkeypatch):
@@ -299,9 +292,7 @@ class _Enough(Exception):
     pass
 
 
-def test_more_starts_than_memory_holds_begin_at_once_and_are_told_one_by_one(
-    tmp_path, capsys, monkeypatch
-):
+def test_more_starts_than_memory_holds_begin_at_once_one_by_one(tmp_path, capsys, monkeypatch):
     """In a pipe too: a line for every start as it ends."""
     path, many = tmp_path / "quick.py", 10**6  # a list of them takes 40 MB
     path.write_text(FILE, encoding="utf-8")

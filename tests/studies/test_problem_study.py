@@ -26,20 +26,9 @@ from colloc.gaits.linear import Combination
 from colloc.results.archive import CRASHED, PASSED_OVER, Outcome
 from colloc.results.comparison import reversed_in_time, swap_ends
 from colloc.results.solution import NOT_CONVERGED, SOLVED
-from colloc.studies import sweep as study_cell
 from colloc.studies import sweep as study_run
 from colloc.studies.study import read_study_file
-from colloc.studies.sweep import (
-    GUESS,
-    WARM,
-    StudyRun,
-    gait_class,
-    read_journal,
-    save_study,
-    start_key,
-    study_table,
-    value_of,
-)
+from colloc.studies.sweep import StudyRun, read_journal, save_study, start_key, study_table
 from colloc.system.task_pool import Lost
 from colloc.verification.replay import replay
 
@@ -88,9 +77,9 @@ def fake(monkeypatch):
     def known(p, g, *_):
         return (0.29 if g.cos[0, 0] > 1.5 else 0.19) + 0.01 * p.friction.mu_t
 
-    monkeypatch.setattr(study_cell, "run_guess", landscape)
-    monkeypatch.setattr(study_cell, "value_of", known)
-    monkeypatch.setattr(study_cell, "start_gait", lambda p, sampler, seed, k: START)
+    monkeypatch.setattr(study_run, "run_guess", landscape)
+    monkeypatch.setattr(study_run, "value_of", known)
+    monkeypatch.setattr(study_run, "start_gait", lambda p, sampler, seed, k: START)
 
 
 def finished(run, **options):
@@ -170,7 +159,7 @@ def test_what_is_found_does_not_depend_on_workers_or_on_who_is_faster(fake, tmp_
         time.sleep(random.Random(arguments[2]).random() * 0.01)
         return landscape(*arguments)
 
-    monkeypatch.setattr(study_cell, "run_guess", slow)
+    monkeypatch.setattr(study_run, "run_guess", slow)
     found = []
     for k, (workers, chunk) in enumerate([(1, 1), (4, 1), (4, 1), (1, 3)]):
         run = StudyRun(grid(chunk=chunk), tmp_path / str(k))
@@ -189,7 +178,7 @@ def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypa
         numbers.append(k)
         return ellipse(0.0, 1.9 if k == 23 else 1.2, 0.4)
 
-    monkeypatch.setattr(study_cell, "start_gait", start)
+    monkeypatch.setattr(study_run, "start_gait", start)
     run = StudyRun(grid(cold_starts=2), tmp_path)
     for progress in run.run(executor=ThreadPoolExecutor):
         best = [state.best for state in run.cells.values() if state.best is not None]
@@ -197,7 +186,7 @@ def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypa
     assert rounds[0] == 1
     assert sorted(set(numbers)) == list(range(2 * 12))
     for state in run.cells.values():
-        guesses = {a.key for a in state.attempts if a.origin == GUESS}
+        guesses = {a.key for a in state.attempts if a.origin == study_run.GUESS}
         assert start_key(state.problem.guess) in guesses
     table = study_table(run).variables
     # the cell that never converges is walked around
@@ -211,9 +200,7 @@ def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypa
     assert not table["below_neighbour"].any()
 
 
-def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_again_and_then_marked(
-    fake, tmp_path, monkeypatch
-):
+def test_a_cell_below_what_a_neighbours_gait_achieves_is_marked(fake, tmp_path, monkeypatch):
     def stubborn(stated, start_from, start, time_limit, **_):
         # in the cell (1, 1) every search ends in the poor basin; elsewhere the guess is good
         guess, law = start_from(), stated.friction
@@ -221,10 +208,14 @@ def test_a_cell_that_stays_below_what_a_neighbours_gait_achieves_there_is_tried_
             return outcome(start, guess, guess, 0.22)
         return outcome(start, guess, ellipse(0.0, 2.0, 0.5), 0.3 + 0.01 * law.mu_t)
 
-    monkeypatch.setattr(study_cell, "run_guess", stubborn)
+    monkeypatch.setattr(study_run, "run_guess", stubborn)
     run = StudyRun(grid(cold_starts=0), tmp_path)
     finished(run)
-    assert {a.origin for a in run.cells[1, 1].attempts} == {GUESS, WARM, study_cell.RESCUE}
+    assert {a.origin for a in run.cells[1, 1].attempts} == {
+        study_run.GUESS,
+        study_run.WARM,
+        study_run.RESCUE,
+    }
     whole = study_table(run)
     table = whole.variables
     assert np.argwhere(table["below_neighbour"]).tolist() == [[1, 1]]
@@ -245,14 +236,14 @@ def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
     exact = replay(*at, gait, stated.delta)
     assert abs(exact.rotation) > 0.01
     sure = max((exact.distance - 0.5 * abs(exact.rotation)) / exact.work, 0.0)
-    assert value_of(stated, gait) == pytest.approx(sure, abs=1e-3 * exact.efficiency)
+    assert study_run.value_of(stated, gait) == pytest.approx(sure, abs=1e-3 * exact.efficiency)
     # where it could add all of it nothing counts, not even by the square of what is less than
     # nothing
     turning = Fourier([0.6, 0.6], [[0.5], [-0.3]], [[0.1], [0.5]])
     turned = replay(*at, turning, stated.delta, instants=200, tolerance=1e-3)
     assert 0.5 * abs(turned.rotation) > turned.distance > 0.01
-    assert value_of(stated.with_(objective="towing"), turning) == 0.0
-    again = replay(*at, study_cell.member(stated, gait), stated.delta)
+    assert study_run.value_of(stated.with_(objective="towing"), turning) == 0.0
+    again = replay(*at, study_run.member(stated, gait), stated.delta)
     assert abs(again.rotation) < 1e-4
 
 
@@ -260,7 +251,7 @@ def test_a_start_that_turns_as_it_should_is_worth_the_same_whatever_phase_it_beg
     turning = Fourier([1.2, 0.6], [[0.9], [0.1]], [[0.1], [0.9]])
     turned = replay(Chain(), Friction(), turning, 1e-2).rotation
     stated = Problem("turning", gait=Harmonic(1), delta=1e-2, rotation=turned)
-    values = [value_of(stated, shift_phase(turning, phase)) for phase in (0.0, 0.3, 0.6)]
+    values = [study_run.value_of(stated, shift_phase(turning, phase)) for phase in (0.0, 0.3, 0.6)]
     np.testing.assert_allclose(values, values[0], rtol=2e-3)
 
 
@@ -286,7 +277,7 @@ def test_failures_are_recorded_skipped_and_tried_again_only_on_request(tmp_path,
             raise ZeroDivisionError("not here")
         return problem(x, y)
 
-    monkeypatch.setattr(study_cell, "run_guess", lambda *a, **_: 1 / 0)
+    monkeypatch.setattr(study_run, "run_guess", lambda *a, **_: 1 / 0)
     run = StudyRun(grid(problem=stated), tmp_path)
     finished(run)
     table = study_table(run).variables
@@ -306,28 +297,28 @@ def test_what_leads_to_nothing_better_is_passed_over_and_the_cell_has_the_best_g
     start, elsewhere = ellipse(0.0, 2.0, 1.0), ellipse(0.0, 2.85, 1.3)
     stated = Problem("two", start, gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=12)
     at = (0,), stated, True, (), (elsewhere,), (0, 3), 0.0, frozenset(), 1, 300.0, 1
-    work = study_cell.Work(*at)
-    done = study_cell.visit(work)
-    assert [a.outcome.status for a in done.attempts if a.origin == WARM] == [SOLVED]
+    work = study_run.Work(*at)
+    done = study_run.visit(work)
+    assert [a.outcome.status for a in done.attempts if a.origin == study_run.WARM] == [SOLVED]
     passed = [a for a in done.attempts if a.outcome.status == PASSED_OVER]
-    assert GUESS in {a.origin for a in passed}
-    best = study_cell.best_attempt(done.attempts).outcome.value
-    alone = [study_cell.run_guess(stated, lambda a=a: a.outcome.guess, 0, 300.0) for a in passed]
+    assert study_run.GUESS in {a.origin for a in passed}
+    best = study_run.best_attempt(done.attempts).outcome.value
+    alone = [study_run.run_guess(stated, lambda a=a: a.outcome.guess, 0, 300.0) for a in passed]
     assert {end.status for end in alone} == {SOLVED}
-    assert max(end.value for end in alone) <= best * (1 + study_cell.BETTER)
+    assert max(end.value for end in alone) <= best * (1 + study_run.BETTER)
     # a cell that was solved before is solved again for what does better, and for nothing else
     for incumbent, status in ((0.9 * best, SOLVED), (1.1 * best, PASSED_OVER)):
         again = dataclasses.replace(work, incumbent=incumbent, cold=())
-        attempts = {a.origin: a.outcome.status for a in study_cell.visit(again).attempts}
-        assert attempts[WARM] == status
+        attempts = {a.origin: a.outcome.status for a in study_run.visit(again).attempts}
+        assert attempts[study_run.WARM] == status
     # and what was tried is not tried again
     told = dataclasses.replace(work, tried=frozenset(a.key for a in done.attempts))
-    assert not study_cell.visit(told).attempts
+    assert not study_run.visit(told).attempts
 
 
 def test_what_nobody_knows_of_a_gait_is_not_kept_and_asked_again(tmp_path):
     scores = {"known": 0.2, "unknown": np.nan, "endless": np.inf}
-    study_cell.append_visits(tmp_path, [study_cell.Visit("a", (), scores)])
+    study_run.append_visits(tmp_path, [study_run.Visit("a", (), scores)])
     (kept,) = read_journal(tmp_path)
     assert kept.scores == {"known": 0.2}
 
@@ -390,15 +381,13 @@ def in_class(kind, guess=ellipse(0.1, 2.0, 1.0), intervals=20):  # noqa: B008
     return Problem("p", guess, gait=CLASSES[kind], delta=1e-3, intervals=intervals)
 
 
-def test_classes_of_gaits_are_an_axis_whose_starts_travel_and_whose_gaits_are_kept_exactly(
-    tmp_path, monkeypatch
-):
+def test_classes_of_gaits_are_an_axis_and_kept_exactly(tmp_path, monkeypatch):
     def next_to(stated, start_from, start, time_limit, **_):
         guess = start_from()
-        gait = study_cell.member(stated, guess)
-        return outcome(start, guess, gait, value_of(stated, gait))
+        gait = study_run.member(stated, guess)
+        return outcome(start, guess, gait, study_run.value_of(stated, gait))
 
-    monkeypatch.setattr(study_cell, "run_guess", next_to)
+    monkeypatch.setattr(study_run, "run_guess", next_to)
     study = Study("kinds", (Axis("kind", tuple(CLASSES)),), in_class, cold_starts=0)
     run = StudyRun(study, tmp_path)
     finished(run)
@@ -440,17 +429,15 @@ def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
 
 
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
-def test_a_class_names_the_symmetry_of_a_gait_and_backwards_or_from_its_other_end_all_runs_the_other_way(
-    symmetry,
-):
+def test_a_class_names_a_symmetry_and_backwards_all_runs_the_other_way(symmetry):
     kind = Harmonic(3, symmetry)
     gait = kind.member(0.4 * np.random.default_rng(3).normal(size=kind.size(2)), 2)
     body, friction = Chain(), Friction(mu_t=3.0, mu_f=1.0, mu_b=1.0)
-    found = gait_class(gait, body, friction)
+    found = study_run.gait_class(gait, body, friction)
     assert found["gait_class"].endswith(f" {symmetry}")
     assert not found["retraced"]
     for other in (reversed_in_time(gait), swap_ends(gait, body)):
-        image = gait_class(other, body, friction)
+        image = study_run.gait_class(other, body, friction)
         assert image["gait_class"] == found["gait_class"]
         assert image["winding"] == -found["winding"]
         for name in ("wave", "forward"):
@@ -461,7 +448,7 @@ def test_a_class_names_the_symmetry_of_a_gait_and_backwards_or_from_its_other_en
 def test_what_is_off_by_a_hundredth_of_a_gait_still_counts_as_symmetric(size):
     for off, symmetry in ((0.01, "both"), (0.03, "none")):
         gait = Fourier([0, 0], [[size, off * size], [0.0, 0.0]], [[0.0, 0.0], [size, 0.0]])
-        found = gait_class(gait, Chain(), Friction(mu_t=3, mu_f=1, mu_b=1))
+        found = study_run.gait_class(gait, Chain(), Friction(mu_t=3, mu_f=1, mu_b=1))
         assert found["gait_class"].endswith(f" {symmetry}")
 
 
@@ -478,7 +465,7 @@ def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
     # it is small
     for sign in (1, -1):
         gait = Fourier([0, 0], [[0.4], [0.0]], [[0.0], [sign * 0.4]])
-        found = gait_class(gait, Chain(), Friction(mu_t=mu_t, mu_f=1, mu_b=1))
+        found = study_run.gait_class(gait, Chain(), Friction(mu_t=mu_t, mu_f=1, mu_b=1))
         assert found["gait_class"] == kind
         assert abs(found["forward"]) == pytest.approx(1.0, abs=1e-6)
 
@@ -553,9 +540,7 @@ STUDY = Study("waves", (Axis("mu_t", (100.0, 50.0)),), problem)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("text", "least"), [(STUDY, 0.3), (PRESCRIBED, 0.5)])
-def test_gaits_of_modes_travel_between_neighbours_and_prescribed_motions_are_measured_once(
-    text, least, tmp_path, capsys
-):
+def test_gaits_of_modes_travel_and_prescribed_motions_do_not(text, least, tmp_path, capsys):
     (tmp_path / "study.py").write_text(text)
     assert sweep_study([str(tmp_path / "study.py"), "--output", str(tmp_path), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["counts"] == {"solved": 2}

@@ -189,9 +189,7 @@ def test_every_command_ends_well_in_a_terminal(words, quick, tmp_path):
         assert efficiency == pytest.approx(chord / work, rel=1e-4)
 
 
-def test_the_first_command_of_the_readme_shows_how_far_it_is_and_then_the_answer_alone(
-    quick, tmp_path
-):
+def test_the_first_command_of_the_readme_shows_how_far_it_is_then_the_answer(quick, tmp_path):
     place(quick, tmp_path, "quick.py")
     said, written = shown(["colloc.solve", "quick.py"], tmp_path)
     assert "quick: explore, 0 of 32; best d/W = 0." in written

@@ -102,9 +102,7 @@ def in_child_that_cannot_write(folder, root, function):
             p.chmod(mode)
 
 
-def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
-    samples, tmp_path, tmp_path_factory
-):
+def test_a_folder_that_cannot_be_written_is_refused_at_once(samples, tmp_path, tmp_path_factory):
     temporary = Path(tempfile.gettempdir()).stat().st_mode
     folder = tmp_path / "locked away"
     folder.mkdir(mode=0o755)

@@ -41,9 +41,7 @@ def with_statement(path, statement):
         "CREATE TABLE other (a)",
     ],
 )
-def test_a_file_with_anything_but_its_one_table_is_refused_by_readers_and_writers(
-    statement, tmp_path
-):
+def test_a_file_with_anything_but_its_table_is_refused_to_read_and_write(statement, tmp_path):
     path = tmp_path / "x.sqlite"
     with_statement(path, statement)
     before = path.read_bytes()

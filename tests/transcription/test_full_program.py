@@ -248,9 +248,7 @@ def test_ipopt_finds_from_the_guess_what_it_confirms():
 
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
-def test_the_estimate_of_multipliers_is_stationary_and_its_fill_grows_with_the_mesh_only(
-    formulation,
-):
+def test_multipliers_are_estimated_and_their_fill_grows_with_the_mesh_only(formulation):
     """No symmetry: the net rotation couples all intervals."""
     fill = []
     for intervals in (20, 40):

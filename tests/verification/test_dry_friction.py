@@ -134,9 +134,7 @@ def test_where_either_foot_may_hold_the_motion_is_bounded_only_loosely():
     ("lengths", "places", "rates"),
     [((1 / 3,) * 3, (0.5,) * 3, (1, 1)), ((0.2, 0.5, 0.3), (0.1, 0.2, 0.9), (0.3, 1))],
 )
-def test_of_three_feet_in_a_row_any_two_may_rest_and_the_bounds_hold_all_these_motions(
-    lengths, places, rates
-):
+def test_of_three_feet_in_a_row_any_two_may_rest_the_bounds_hold_all(lengths, places, rates):
     """Each bears as much as makes either motion cost the same: the middle one half."""
     masses, hinges = (0.5, 0.2, 0.3), np.array([0.0, lengths[0], lengths[0] + lengths[1]])
     at = hinges + np.array(places) * lengths
@@ -213,9 +211,7 @@ def test_what_the_quadrature_is_off_by_counts_once_to_each_side(monkeypatch, int
     ("what", "row", "every"),
     [("z", 0, 1), ("z", 1, 1), ("apart", 0, 1), ("apart", 1, 1), ("apart", 0, 2)],
 )
-def test_a_velocity_that_is_off_or_open_leads_as_far_as_it_carries_in_a_period(
-    interval, what, row, every
-):
+def test_a_velocity_that_is_off_leads_as_far_as_it_carries_in_a_period(interval, what, row, every):
     """Between two instants the worse counts: with every other off, all of the period."""
     exact, found = widths(interval()), widths(interval(what, shifted(row, every)))
     assert found[0] - exact[0] == pytest.approx(2 * OFF, rel=1e-3)

@@ -164,9 +164,7 @@ def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts
     ("rule", "friction", "held"),
     [("radau-3", UNEQUAL, False), ("radau-3", Friction(), True), ("gauss-3", UNEQUAL, True)],
 )
-def test_no_node_lies_where_friction_backwards_takes_over_from_friction_forwards(
-    rule, friction, held, monkeypatch
-):
+def test_no_node_lies_where_friction_changes_its_sense(rule, friction, held, monkeypatch):
     """Schemes with nodes at ends of intervals would give the efficiency a kink there."""
     stated, kink = problem(friction=friction, scheme=rule, intervals=8), 0.1234
     monkeypatch.setattr(refinement, "kink_phases", lambda *arguments: np.array([kink]))

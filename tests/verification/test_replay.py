@@ -10,16 +10,8 @@ import pytest
 from benchmarks.audit import path_of, random_problem
 from colloc import Chain, Corners, Fourier, Friction, ellipse, replay
 from colloc.mechanics.contact import crossing_depth
+from colloc.verification import replay as panelled
 from colloc.verification.adaptive_motion import fine_motion
-from colloc.verification.replay import (
-    HALF,
-    Panels,
-    changes,
-    first_panels,
-    increments,
-    poses,
-    remaining_error,
-)
 from tests.conftest import ROOT
 from tests.shared.mechanics import coulomb
 
@@ -150,11 +142,11 @@ def panels_of(power, n=16, corner=None):
     if corner is not None:
         t[np.isclose(left, corner), 0] += 1e-12
         t[np.isclose(left + width, corner), 4] -= 1e-12
-    return first_panels(left, width, at_rest(power(t)))
+    return panelled.first_panels(left, width, at_rest(power(t)))
 
 
 def stated_work(panels):
-    return remaining_error(*changes(panels)[1:], panels.wider)[:, WORK].sum()
+    return panelled.remaining_error(*panelled.changes(panels)[1:], panels.wider)[:, WORK].sum()
 
 
 def slope_jump(x):
@@ -179,7 +171,7 @@ def test_stated_errors_cover_a_kink_wherever_it_lies(share):
 
         panels = panels_of(lambda t: kink(t)[0])
         exact = kink(1.0)[1] - kink(0.0)[1]
-        true.append(abs(increments(panels)[WORK].sum() - exact))
+        true.append(abs(panelled.increments(panels)[WORK].sum() - exact))
         stated.append(stated_work(panels))
     assert np.all(np.array(true) <= stated)
     assert np.median(np.array(stated) / true) < 8
@@ -200,17 +192,17 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
     centre[:] = centre[:, :1] if steady else centre
     rates = np.stack([spin, centre, *rng.uniform(1, 2, (3, n, 5))], axis=-1)
     values = rng.normal(size=(n, 5, 3)), rates, spin, np.zeros((n, 5, 5))
-    panels = Panels(np.arange(n) / n, np.full(n, 1 / n), *values, np.zeros((n, 5)))
-    once, twice = increments(panels, HALF), increments(panels)
+    panels = panelled.Panels(np.arange(n) / n, np.full(n, 1 / n), *values, np.zeros((n, 5)))
+    once, twice = panelled.increments(panels, panelled.HALF), panelled.increments(panels)
 
     def distance(turn, move):
-        return abs(poses(turn, move)[1][-1])
+        return abs(panelled.poses(turn, move)[1][-1])
 
     for k in range(n):
         turn, move = twice[0].copy(), twice[1].copy()
         turn[k], move[k] = once[0][k], once[1][k]
         change, rel = abs(distance(turn, move) - distance(*twice[:2])), 3e-2 if steady else 1e-3
-        assert changes(panels)[0][k, 1] == pytest.approx(change, rel=rel, abs=1e-9)
+        assert panelled.changes(panels)[0][k, 1] == pytest.approx(change, rel=rel, abs=1e-9)
 
 
 AUDIT = (ROOT / "results/curated/audit.jsonl").read_text(encoding="utf-8")
