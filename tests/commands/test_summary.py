@@ -23,9 +23,9 @@ def told_of_limits(gait=LOOP, **limits):
     return found, [line[18:] for line in summary_lines(found, None) if line.startswith("  limits ")]
 
 
-def test_the_share_of_every_limit_that_a_gait_uses_is_told_with_its_unit():
+def test_the_share_of_every_limit_that_a_gait_uses_is_told():
     limits = {"torque_limit": 0.05, "power_limit": (0.2, 0.4)}
-    found, lines = told_of_limits(joint_limit=2.0, speed_limit=10.0, **limits)
+    found, _ = told_of_limits(joint_limit=2.0, speed_limit=10.0, **limits)
     shares = summary_dict(found, None, None, None)["limits"]
     assert list(shares) == ["joint angles", "joint speed", "torque", "power"]
     t = np.linspace(0, 1, 4001)
@@ -36,12 +36,6 @@ def test_the_share_of_every_limit_that_a_gait_uses_is_told_with_its_unit():
     assert shares["torque"] == pytest.approx(np.abs(torques).max() / 0.05, rel=1e-3)
     powers = (torques * rates).max(axis=1) / [0.2, 0.4]
     assert shares["power"] == pytest.approx(powers.max(), rel=1e-3)
-    of_speed, of_torque = f"{100 * shares['joint speed']:.0f}", f"{100 * shares['torque']:.0f}"
-    assert lines == [
-        f"joint angles {100 * shares['joint angles']:.0f} %, joint speed {of_speed} % of 10 rad "
-        f"per period, "
-        f"torque {of_torque} % of 0.05 weight x body length, power {100 * shares['power']:.0f} %"
-    ]
 
 
 def test_a_limit_of_all_joints_matters_if_it_does_to_one_and_one_of_each_is_named_by_its_joint():

@@ -32,6 +32,8 @@ LOOP = ellipse(0.0, 1.2, 0.8)
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
 LEANING = Fourier([0.1, -0.1], [[1.2], [0.1]], [[0.0], [-0.8]], theta=0.3)
 SWUNG = Fourier([0.1, 0.2], [[0.0, 0.0], [0.5, 0.0]], [[1.0, 0.25], [0.4, 0.0]])
+LAG = 0.4 * np.pi * np.arange(4)[:, None]
+RUNNING = Fourier(np.zeros(4), 1.2 * np.cos(LAG), 1.2 * np.sin(LAG))
 UNEQUAL = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 STANDING = Chain(feet=(Foot(0), Pad(1, 0.1, 0.6), Wheel(2, 0.3, rolling=0.1)))
 ONE = Robot(length=1, mass=2, period=50, max_speed=2, max_torque=(2.5, 1.5), idle_power=0.01)
@@ -68,6 +70,7 @@ STATED = {
         "robot": replace(ONE, period=5),
         "guess": LEANING,
     },
+    "snake": {"body": Chain((0.2,) * 5), "friction": Friction(mu_t=10.0), "guess": RUNNING},
     "climb": {"grade": 0.05, "guess": LEANING, "friction": Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0)},
     "pace": {
         "froude": Free(0.01, 0.5),
@@ -86,6 +89,7 @@ GUESSES = {
     "feet": 0.31,
     "slope": 0.18,
     "climb": 0.083,
+    "snake": 0.4,
     "pace": 0.0135,
     "waves": 0.06,
 }

@@ -162,6 +162,8 @@ def card(name):
 
 
 def words_of(page):
+    plain = re.findall(r'"(grid|shape|width|arrowScale)":([^,}]*)', page)
+    page += "\n".join(map(" ".join, plain))
     page = re.sub(r'<input [^>]*(min="[^"]*" max="[^"]*")[^>]*>', r"\1", page)
     page = re.sub(r"(?s)<(style|script|svg).*?</\1>", "", page)
     return re.sub(r"\s*\n\s*", "\n", re.sub(r"(<[^>]*>\s*)+", "\n", page))
@@ -192,7 +194,8 @@ def described(figure):
         if legend := axes.get_legend():
             rows.append(f"  legend: {', '.join(text.get_text() for text in legend.get_texts())}")
         if axes.texts:
-            rows.append(f"  text: {', '.join(text.get_text() for text in axes.texts)}")
+            said = (x.get_text() or f"arrow {span((*x.xyann, *x.xy))}" for x in axes.texts)
+            rows.append(f"  text: {', '.join(said)}")
         looks = {}
         for line in axes.lines:
             xy = np.array(line.get_data(), dtype=float)
