@@ -11,7 +11,9 @@ import traceback
 import types
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from colloc.gaits.gait_fields import check_kind
 from colloc.gaits.problem import Problem
 from colloc.system.arguments import is_whole, named_arguments
 from colloc.system.errors import ProblemError
@@ -67,14 +69,9 @@ def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
     problem, reference, starts = (names.get(each) for each in ("PROBLEM", "REFERENCE", "STARTS"))
     if problem is None:
         raise ProblemError(f"{path} states no PROBLEM; end it with PROBLEM = Problem(...).")
-    if not isinstance(problem, Problem):
-        raise ProblemError(
-            f"{path}: PROBLEM must be a colloc.Problem, not {type(problem).__name__}."
-        )
-    if reference is not None and not isinstance(reference, Reference):
-        raise ProblemError(
-            f"{path}: REFERENCE must be a colloc.Reference, not {type(reference).__name__}."
-        )
+    check_kind(f"{path}: PROBLEM", problem, [Problem])
+    if reference is not None:
+        check_kind(f"{path}: REFERENCE", reference, [Reference])
     length = len(json.dumps(problem.to_dict()).encode())
     if length > LONGEST_TEXT:
         raise ProblemError(f"{path}: {_too_long('the description of PROBLEM', length)}")
@@ -112,7 +109,7 @@ def _too_long(what: str, size: int) -> str:
     )
 
 
-def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, object], str]:
+def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[str, Any], str]:
     """Execute a file; its path, the names it leaves and its text. Its output goes to standard
     error. `kind` ("problem", "study") is for messages."""
     path = Path(path)

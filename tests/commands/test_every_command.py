@@ -141,7 +141,7 @@ def test_bad_input_is_refused_in_one_sentence_and_as_one_json_object(name, place
 
 BAD_PROBLEMS = {
     "x = 1": "states no PROBLEM",
-    "PROBLEM = 3": "must be a colloc.Problem",
+    "PROBLEM = 3": "PROBLEM must be a Problem",
     "a = 1\nb = = 2": "line 2",
     "a = 1\n\nb = 1/0": "line 3",
     "import sys\nsys.exit(0)": "p.py, line 2: the file ends the program",
