@@ -379,7 +379,7 @@ OwnLaw("-vs**vs", "-vn") -> exponent
 evaluate(PROBLEM, np.zeros((3, 20))) -> angles of 3 joints, and the body has 2
 evaluate(PROBLEM, np.full((2, 20), np.nan)) -> must be a finite 2-D array
 evaluate(PROBLEM, GAIT.angles(np.arange(20) / 60)) -> does not close
-evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=0) -> period must be positive
+evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=0) -> period must be a positive
 evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=0.06) -> in the file's unit of time
 evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), harmonics=40) -> 60 samples determine 1 to 28 harmonics
 evaluate(PROBLEM, 0.01 * GAIT.angles(np.arange(60) / 60)) -> hardly moves
@@ -405,7 +405,7 @@ Harmonic(6, "antipodal") -> odd harmonics only.*ask for 5 or 7
 Harmonic(0) | Harmonic(1.5) -> harmonics
 Harmonic(symmetry="mirror") -> symmetry
 Harmonic(2).member(np.full(9, 1e308), 2) -> must be a finite
-BSpline(4) -> from degree
+BSpline(4) -> from 5 to 64
 BSpline(1, 2) -> knots
 BSpline(9, symmetry="antipodal") -> even number of knots
 BSpline(8, degree=0) -> degree must be 2, 3, 4 or 5

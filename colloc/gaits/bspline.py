@@ -31,7 +31,13 @@ from colloc.gaits.gait import (
 from colloc.gaits.harmonic import Harmonic, series_of
 from colloc.gaits.linear import LinearClass
 from colloc.numerics.mesh import Mesh
-from colloc.system.arguments import STATED_IF_SET, finite_array, is_whole, named_arguments
+from colloc.system.arguments import (
+    STATED_IF_SET,
+    check_count,
+    finite_array,
+    is_whole,
+    named_arguments,
+)
 from colloc.system.csv_table import csv_table
 from colloc.system.errors import ProblemError
 
@@ -232,11 +238,7 @@ class BSpline(Splines):
             raise ProblemError(
                 f"gait.degree must be 2, 3, 4 or 5 (Polygon has 1), not {self.degree!r}."
             )
-        if not is_whole(self.knots, self.degree + 1, 64):
-            raise ProblemError(
-                f"gait.knots must be an integer from degree + 1 = {self.degree + 1} to 64, not "
-                f"{self.knots!r}."
-            )
+        check_count(64, self.degree + 1, **{"gait.knots": self.knots})
         self._check_symmetry()
         if self.symmetry == ANTIPODAL and self.knots % 2:
             raise ProblemError(
@@ -282,10 +284,7 @@ class Polygon(Splines):
     relative_delta, delta_start = True, DELTA_START
 
     def __post_init__(self) -> None:
-        if not is_whole(self.corners, 2, 64):
-            raise ProblemError(
-                f"gait.corners must be a whole number from 2 to 64, not {self.corners!r}."
-            )
+        check_count(64, 2, **{"gait.corners": self.corners})
         self._check_symmetry()
         if self.axis not in ("corner", "side"):
             raise ProblemError(f"gait.axis must be 'corner' or 'side', not {self.axis!r}.")

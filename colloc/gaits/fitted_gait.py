@@ -21,7 +21,7 @@ from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Fourier
 from colloc.gaits.record import FEWEST, LARGEST, Column, Record, read_record
 from colloc.mechanics.chain import Chain
-from colloc.system.arguments import finite_array
+from colloc.system.arguments import check_finite, finite_array
 from colloc.system.errors import ProblemError
 
 _MOST_HARMONICS, _SAMPLES_A_HARMONIC = 24, 4
@@ -215,9 +215,9 @@ class _Samples(NamedTuple):
     def check(self, period: float | None, harmonics: int | None) -> None:
         step, most, span = self.step, (self.time.size - 3) // 2, self.time[-1]
         what = ""
-        if period is not None and (not np.isfinite(period) or period <= 0):
-            what = f"the period must be positive, not {period:g}."
-        elif period is not None and span < 0.5 * period:
+        if period is not None:
+            check_finite(positive=True, period=period)
+        if period is not None and span < 0.5 * period:
             what = f"{self.name} holds {span:.4g} of a period of {period:.4g}: record at least one."
         elif period is not None and period < FEWEST * step:
             what = (

@@ -33,9 +33,9 @@ from colloc.mechanics.bodies import Body
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import (
     STATED_IF_SET,
+    check_count,
     check_finite,
     finite_array,
-    is_whole,
     named_arguments,
 )
 from colloc.system.errors import ProblemError
@@ -193,8 +193,7 @@ class Harmonic(LinearClass):
 
     def __post_init__(self) -> None:
         k = self.harmonics
-        if not is_whole(k, 1, 64):
-            raise ProblemError(f"gait.harmonics must be an integer from 1 to 64, not {k!r}.")
+        check_count(64, **{"gait.harmonics": k})
         self._check_symmetry()
         if self.symmetry == ANTIPODAL and k % 2 == 0:
             raise ProblemError(

@@ -44,8 +44,9 @@ from colloc.numerics.schemes import scheme
 from colloc.smooth.smooth_body import schedule
 from colloc.system.arguments import (
     STATED_IF_SET,
+    check_count,
     check_finite,
-    is_number,
+    check_positive,
     is_whole,
     named_arguments,
 )
@@ -277,11 +278,8 @@ class Problem:
         self._set(**{name: x for name, x in defaults.items() if getattr(self, name) is None})
 
     def _check_discretisation(self) -> None:
-        numbers = ("delta", "delta_start", "smallest_shape_speed", "mesh_tolerance")
-        check_finite(**{name: getattr(self, name) for name in numbers})
-        for name in ("delta", "smallest_shape_speed"):
-            if getattr(self, name) <= 0:
-                raise ProblemError(f"{name} must be positive, not {getattr(self, name):g}.")
+        check_finite(delta_start=self.delta_start, mesh_tolerance=self.mesh_tolerance)
+        check_positive(self, "delta", "smallest_shape_speed")
         if self.delta < SMALLEST_DELTA:
             raise ProblemError(
                 f"delta must be at least {SMALLEST_DELTA:g}, not {self.delta:g}: slower speeds are "
@@ -306,11 +304,7 @@ class Problem:
                 f"{self.scheme}."
             )
         fewest, what = self.gait.fewest_intervals(collocation.s - collocation.left)
-        if not is_whole(self.intervals, most=MOST_INTERVALS):
-            raise ProblemError(
-                f"intervals must be a whole number of at most {MOST_INTERVALS}, not "
-                f"{self.intervals!r}."
-            )
+        check_count(MOST_INTERVALS, intervals=self.intervals)
         if self.intervals < fewest:
             raise ProblemError(
                 f"the mesh is too small: {self.intervals} intervals of {self.scheme} cannot "
@@ -323,11 +317,10 @@ class Problem:
                 "the objective or a requirement uses the period: state the pace, froude=0.05 or "
                 "froude=Free(0.001, 1)."
             )
-        least = self.least_distance
-        if least is not None and not (is_number(least) and least > 0):
-            raise ProblemError(f"least_distance must be a positive number, not {least!r}.")
-        if self.rotation is not None and not is_number(self.rotation):
-            raise ProblemError(f"rotation must be a finite number or None, not {self.rotation!r}.")
+        if self.least_distance is not None:
+            check_positive(self, "least_distance")
+        if self.rotation is not None:
+            check_finite(rotation=self.rotation)
         if self.rotation == 0 and self.uses("rotation"):
             raise ProblemError(
                 "the objective uses the rotation, which is 0 unless rotation says otherwise "

@@ -15,7 +15,7 @@ from typing import Any
 
 from colloc.gaits.gait_fields import check_kind
 from colloc.gaits.problem import Problem
-from colloc.system.arguments import is_whole, named_arguments
+from colloc.system.arguments import check_count, named_arguments
 from colloc.system.errors import ProblemError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -75,8 +75,8 @@ def read_problem_file(path: str | os.PathLike[str]) -> ProblemFile:
     length = len(json.dumps(problem.to_dict()).encode())
     if length > LONGEST_TEXT:
         raise ProblemError(f"{path}: {_too_long('the description of PROBLEM', length)}")
-    if starts is not None and not is_whole(starts, 1):
-        raise ProblemError(f"{path}: STARTS must be a whole number of at least 1, not {starts!r}.")
+    if starts is not None:
+        check_count(**{f"{path}: STARTS": starts})
     return ProblemFile(problem, reference, source, starts)
 
 

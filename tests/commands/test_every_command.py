@@ -49,7 +49,7 @@ solve nope.py -> there is no problem file
 solve good.h5 -> is a results file (HDF5), not a problem file
 solve LONG -> there is no problem file
 solve problem.py --delta x -> --delta must be a number, not 'x'
-solve problem.py --delta 0 -> delta must be positive
+solve problem.py --delta 0 -> delta must be a positive finite number
 solve problem.py --delta 1e-30 -> delta must be at least 1e-14
 solve problem.py --mesh x -> --mesh must be a whole number, not 'x'
 solve problem.py --mesh 1 -> mesh is too small
@@ -149,7 +149,7 @@ BAD_PROBLEMS = {
     "x = 1\nraise GeneratorExit": "p.py, line 2: ",
     "x = 1\nraise type('Own', (BaseException,), {})('no')": "p.py, line 2: ",
     "x = 1\nraise BaseExceptionGroup('x', [GeneratorExit()])": "p.py, line 2: ",
-    GOOD.replace("delta=0.3", "delta=-1e-4"): "delta must be positive",
+    GOOD.replace("delta=0.3", "delta=-1e-4"): "delta must be a positive finite number",
     GOOD.replace('"quick"', '"../quick"'): "name must be",
 }
 
