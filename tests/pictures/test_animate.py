@@ -44,12 +44,12 @@ def test_every_picture_shows_the_body_where_it_is_then(three_link):
 
 def test_gif_has_the_pictures_and_the_pace_asked_for(three_link, tmp_path, capsys):
     file = save(three_link, tmp_path / "x.h5")
-    words = "--periods 1 --seconds 1 --fps 10 --width 300"
+    words = "--periods 1 --seconds 0.5 --fps 20 --width 300"
     assert main([str(file), *words.split()]) == 0
     assert "saved" in capsys.readouterr().out
     with Image.open(tmp_path / "x.gif") as image:
         found = image.n_frames, image.info["duration"], image.info["loop"], image.size[0]
-        assert found == (10, 100, 0, 300)
+        assert found == (10, 50, 0, 300)
 
 
 def extents(picture):
