@@ -42,13 +42,15 @@ def test_it_is_what_a_replay_of_the_angles_says(evaluated):
 LINKS = (0.3, 0.45, 0.25)
 
 
-def filmed(path, time, lengths=LINKS, names="x_{} y_{}"):
-    """Points of a body of 250 pixels with the gait, whose centre goes 0.05 of its length a period."""
+def filmed(path, time, lengths=LINKS, names="x_{} y_{}", sway=0.0):
+    """Points of a body of 250 pixels with the gait, whose centre goes 0.05 of its length a period,
+    but for a sway in two periods."""
     turns = np.vstack([0 * time, np.cumsum(GAIT.angles(time), axis=0)])[: len(lengths)]
     links = np.array(lengths)[:, None] * np.exp(1j * (turns + 0.4 * np.sin(2 * np.pi * time)))
     points = np.vstack([0 * time, np.cumsum(links, axis=0)])
     points -= np.array(lengths) @ (0.5 * (points[:-1] + points[1:]))
-    points = 250 * (points + (0.03 - 0.04j) * time) + 700 + 300j
+    along = time + sway * np.sin(np.pi * time)
+    points = 250 * (points + (0.03 - 0.04j) * along) + 700 + 300j
     rows = np.stack([points.real, points.imag], axis=1).reshape(-1, time.size)
     header = ",".join(names.format(k, k).replace(" ", ",") for k in range(len(points)))
     return written(path, time, rows, f"t,{header}")
@@ -67,6 +69,12 @@ def test_points_of_the_body_tell_its_angles_and_how_far_it_went(time, tmp_path):
     assert went == pytest.approx(0.05, rel=0.01)
     assert f"predicted {found.distance:.3g} +- " in found.message
     assert found.message.endswith(f"{found.travels}.")
+
+
+def test_how_far_it_went_is_the_mean_of_all_cycles_of_a_film(tmp_path):
+    path = filmed(tmp_path / "film.csv", np.arange(121) / 60, sway=0.1)
+    went = fitted_gait(path, 2, body=colloc.Chain(LINKS)).went
+    assert went == pytest.approx(0.05 * (1 - 0.4 / np.pi), rel=1e-2)
 
 
 @pytest.mark.parametrize(
