@@ -28,6 +28,7 @@ CLEARANCE_SMOOTHING = 2e-4
 """Width [body lengths] of smoothed absolute values and minima; they err to the safe side, by at
 most twice this."""
 _ROUNDING = 1e-12
+_BLOCK = 40_000  # distances at once
 Pair = tuple[int, int]
 Pairs = tuple[Pair, ...]
 
@@ -267,7 +268,7 @@ def crossing_depth(
         return np.zeros(angles.shape[1])
     ends = np.stack(body.joints(angles))
     near = _within_reach(ends, _pairs_apart(body.n_link, 2)) if pairs is None else list(pairs)
-    depth = _crossing(ends, near).max(axis=0, initial=0.0)
+    depth = _in_blocks(_crossing, ends, near).max(axis=0, initial=0.0)
     if body.width == 0:
         return depth
     beside = ends_and_links(body) if pairs is None else _ends_beside(near).reshape(-1, 2)
@@ -286,19 +287,30 @@ def passing_depth(body: Any, angles: np.ndarray) -> float:
         return 0.0
     ends = np.stack(body.joints(angles))
     near = _within_reach(ends, _pairs_apart(body.n_link, 2))
-    return float(_passing(ends, near).max(initial=0.0))
+    return float(_in_blocks(_passing, ends, near).max(initial=0.0))
 
 
 def overlapping_pairs(ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float) -> Pairs:
     """Pairs of links that overlap, or pass through each other along a path, by more than `least`
     [body lengths]; from the coordinates ``(2, n_link + 1, n_time)`` of joints and tips."""
     near = _within_reach(ends, pairs, width)
-    depth = _crossing(ends, near)
+    depth = _in_blocks(_crossing, ends, near)
     if width > 0:
         gaps = [_gaps(ends, beside) for beside in _ends_beside(near)]
         depth = _with_width(depth, np.min(gaps, axis=0), width)
-    deepest = np.maximum(depth.max(axis=1), _passing(ends, near))
+    deepest = np.maximum(depth.max(axis=1), _in_blocks(_passing, ends, near))
     return tuple(pair for pair, deep in zip(near, deepest, strict=True) if deep > least)
+
+
+def _in_blocks(
+    of_pairs: Callable[[np.ndarray, Sequence[Pair]], np.ndarray],
+    ends: np.ndarray,
+    pairs: Sequence[Pair],
+) -> np.ndarray:
+    """A function of pairs, of so many at once as stay in the cache."""
+    size = max(1, _BLOCK // ends.shape[2])
+    blocks = (pairs[k : k + size] for k in range(0, max(1, len(pairs)), size))
+    return np.concatenate([of_pairs(ends, block) for block in blocks])
 
 
 def _columns(pairs: Sequence[Pair] | np.ndarray) -> np.ndarray:
@@ -359,11 +371,15 @@ def _seen_ends(ends: np.ndarray, pairs: Sequence[Pair]) -> tuple[np.ndarray, np.
 def _within_reach(ends: np.ndarray, pairs: Sequence[Pair], width: float = 0.0) -> list[Pair]:
     """Pairs whose links can come nearer than their width, at a time point or on the straight way to
     the next: their middles say that most never do."""
-    i, j = _columns(pairs)
     middles = 0.5 * (ends[:, 1:] + ends[:, :-1])
     lengths = _length(ends[:, 1:] - ends[:, :-1]).max(axis=1, initial=0.0)
-    apart = middles[:, j] - middles[:, i]
-    step = _length(np.diff(apart)).max(axis=1, initial=0.0)
-    near = _length(apart).min(axis=1, initial=np.inf)
-    within = near <= 0.5 * (lengths[i] + lengths[j] + step) + width
-    return [pair for pair, here in zip(pairs, within, strict=True) if here]
+
+    def within(middles: np.ndarray, pairs: Sequence[Pair]) -> np.ndarray:
+        i, j = _columns(pairs)
+        apart = middles[:, j] - middles[:, i]
+        step = _length(np.diff(apart)).max(axis=1, initial=0.0)
+        reach = 0.5 * (lengths[i] + lengths[j] + step) + width
+        return _length(apart).min(axis=1, initial=np.inf) <= reach
+
+    here = _in_blocks(within, middles, pairs)
+    return [pair for pair, near in zip(pairs, here, strict=True) if near]

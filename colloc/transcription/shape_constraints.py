@@ -34,6 +34,7 @@ _HELD_SHARE, _HELD_NEAR = 1e-3, 0.05
 it is this near to its bound [rad]: elsewhere the gait may move far."""
 _STEP, _LARGEST, _STEPS = 1e-3, 0.1, 4
 """Sampling and largest step of Newton's method, as parts of a cell; number of steps."""
+_BLOCK = 4000  # values at once, which stay in the cache
 _NONE = np.empty(0)
 
 
@@ -205,17 +206,22 @@ def near_peaks(
     shapes = table @ gaits.functions(times) + gaits.offset(len(table))
     if checks.n_shape < every.size:
         shapes = np.concatenate([shapes, table @ gaits.functions(times, 1)], axis=1)
-    which = np.repeat(every, times.size)
-    column = np.tile(np.arange(times.size), every.size) + times.size * (which >= checks.n_shape)
-    highest = excess(which, checks.values(which, shapes, column=column))
-    most = highest.reshape(every.size, mesh.n, -1).max(axis=2)
+    most, size = np.empty((every.size, mesh.n)), max(1, _BLOCK // times.size)
+    for some in (slice(k, k + size) for k in range(0, every.size, size)):
+        which = np.repeat(every[some], times.size)
+        column = np.resize(np.arange(times.size), which.size)
+        column += times.size * (which >= checks.n_shape)
+        highest = excess(which, checks.values(which, shapes, column=column))
+        most[some] = highest.reshape(-1, mesh.n, SAMPLES + 1).max(axis=2)
     around = np.pad(most, ((0, 0), (1, 1)), constant_values=-np.inf)
     peak = (most >= around[:, :-2]) & (most >= around[:, 2:])
     which, cells = np.nonzero((most > -_NEAR) | (peak & (most > -_FAR)))
 
     def at_times(t: np.ndarray) -> np.ndarray:
-        of = np.repeat(which, t.shape[1])
-        values = checks.values(of, checks.shapes(gaits, table, of, t.ravel()))
+        of, values = np.repeat(which, t.shape[1]), np.empty(t.size)
+        for at in (slice(k, k + _BLOCK) for k in range(0, t.size, _BLOCK)):
+            shapes = checks.shapes(gaits, table, of[at], t.ravel()[at])
+            values[at] = checks.values(of[at], shapes)
         return excess(of, values).reshape(t.shape)
 
     return which, cells, peaks(at_times, mesh.edges[cells], mesh.h[cells])[0]
