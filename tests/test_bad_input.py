@@ -274,7 +274,7 @@ Chain(weights=(0.5, 0.5, 0.5)) | Chain(weights=(0.5, 0.5, 0.0)) | Chain(weights=
 Chain(weights=(1.0,)) | Chain(masses=(0.5, 0.5)) | Chain(inertias=(0.1, 0.1)) -> one for each of the 3 links
 Chain(weights=3.0) -> sequence of numbers
 Chain(masses=(0.5, 0.5, 0.5)) -> the body's mass 1
-Chain(inertias=(0.1, -0.1, 0.1)) -> not negative
+Chain(inertias=(0.1, -0.1, 0.1)) -> must be a number of at least 0
 Chain(feet=(Foot(0), Foot(3))) -> numbered 0 to 2
 Chain(feet=(Foot(0, weight=0.5), Foot(2, weight=0.4))) -> add up to 1, not 0.9
 Chain(feet=(Foot(0, 1.0, 0.5), Foot(1, 0.0, 0.5))) -> at two points at least
@@ -306,7 +306,7 @@ Axle(sideways=-1.0) -> sideways
 robot(length=62.0) -> 62 metres.*write length=0.62
 robot(mass=0.0) -> mass must be a number
 robot(period=(3.0, 2.0)) -> the shortest and the longest
-robot(idle_power=-1.0) -> idle_power must be a number from 0 on
+robot(idle_power=-1.0) -> idle_power must be a number from 0
 Problem("x", robot=robot(), froude=0.1) -> froude follows from the robot
 Problem("x", robot={"length": 1}) -> robot must be a Robot
 solve_balance(*AT, ONES, ONES, 0.0) | solve_balance(*AT, ONES, ONES, -1e-4) | solve_balance(*AT, ONES, ONES, np.nan) -> delta
@@ -339,7 +339,7 @@ driven(gears=((1,),) * 3) -> on 1 motor.* goes anywhere
 Coupled(Chain(), stuck={1: 0.4}) -> gait=Coupled\(Harmonic\(1\), stuck=
 slope_motion(CrawlerBody(), Friction(), GAIT, 1e-2, 0.1) -> only a Chain
 slope_motion(Belt(), Friction(), GAIT, 1e-2, 0.1) -> only a Chain, whose joints are its own, can be put on a slope, not Belt
-slope_motion(**ON, grade=-0.1) -> grade must be a number that is not negative
+slope_motion(**ON, grade=-0.1) -> grade must be a number of at least 0
 slope_motion(**ON, grade=np.nan) -> grade must be
 slope_motion(**ON, grade=0.1, periods=0) -> periods must be a whole number from 1
 slope_motion(**ON, grade=0.1, heading=np.nan) -> heading must be a number or None, not nan
@@ -463,7 +463,7 @@ objective="driven efficiency", formulation="implicit velocity" -> formulation 'f
 objective=Objective("distance / heat") -> uses heat
 objective=Objective("1 / mine", quantities=[Quantity("mine", "moment**2")]) -> no sum over the joints
 objective=Objective("1 / work", quantities=[Quantity("work", "sum(rate)")]) -> a name of its own
-froude=-1.0 | froude="fast" -> not negative
+froude=-1.0 | froude="fast" -> must be a number of at least 0
 froude=0.1, gait=MIRRORED -> run backwards
 froude=0.1, gait=Polygon(4) -> leaves the pace open
 froude=0.1, body=ModalBody(), gait=Harmonic(1) -> of a ModalBody
@@ -489,7 +489,7 @@ grade=0.1, rotation=0.1 -> a body that a cycle turns has no gait that repeats
 grade=0.1, formulation="implicit velocity" -> only the formulation 'full'
 scheme="spline" | scheme="gauss-0" | scheme="gauss-13" | scheme="radau" | scheme=3 | scheme="" -> unknown scheme
 grade=0.1, scheme="trapezoid" -> a gauss-N or radau-N scheme is needed
-grade=0.1, towards="up" -> towards must be a finite angle
+grade=0.1, towards="up" -> towards must be a finite number
 towards=1.0 -> towards is a direction on a slope
 body=Chain((0.5, 0.5)), gait=Harmonic(1, "antipodal") -> scallop
 gait=Polygon(2) | gait=Basis([BUMP]) -> it retraces its path, and reversed rates

@@ -33,6 +33,7 @@ from colloc.gaits.linear import LinearClass
 from colloc.numerics.mesh import Mesh
 from colloc.system.arguments import (
     STATED_IF_SET,
+    check_choice,
     check_count,
     finite_array,
     is_whole,
@@ -80,11 +81,7 @@ class Corners(GaitFunction):
     theta: float | None = field(default=None, metadata=STATED_IF_SET, kw_only=True)
 
     def __post_init__(self) -> None:
-        if self.symmetry not in SYMMETRIES:
-            raise ProblemError(
-                f"the symmetry of a path must be one of {', '.join(SYMMETRIES)}, not "
-                f"{self.symmetry!r}."
-            )
+        check_choice(SYMMETRIES, **{"polygon.symmetry": self.symmetry})
         object.__setattr__(self, "corners", finite_array("polygon.corners", self.corners, 2))
         if self.corners.shape[0] < 1 or self.corners.shape[1] < 2:
             raise ProblemError("polygon.corners needs a row per joint and at least two columns.")
@@ -286,8 +283,7 @@ class Polygon(Splines):
     def __post_init__(self) -> None:
         check_count(64, 2, **{"gait.corners": self.corners})
         self._check_symmetry()
-        if self.axis not in ("corner", "side"):
-            raise ProblemError(f"gait.axis must be 'corner' or 'side', not {self.axis!r}.")
+        check_choice(("corner", "side"), **{"gait.axis": self.axis})
         if self.symmetry == ANTIPODAL and self.corners % 2:
             raise ProblemError(
                 f"an antipodal polygon has an even number of corners, not {self.corners}."

@@ -33,6 +33,7 @@ from colloc.mechanics.bodies import Body
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.arguments import (
     STATED_IF_SET,
+    check_choice,
     check_count,
     check_finite,
     finite_array,
@@ -533,10 +534,7 @@ class Prescribed(LinearClass):
     def __post_init__(self) -> None:
         stages = tuple(float(t) for t in self.stages)
         object.__setattr__(self, "stages", stages)
-        if self.symmetry not in (NONE, ANTIPODAL):
-            raise ProblemError(
-                f"gait.symmetry must be one of none, antipodal, not {self.symmetry!r}."
-            )
+        check_choice((NONE, ANTIPODAL), **{"gait.symmetry": self.symmetry})
         ends = (stages[0], stages[-1]) if len(stages) > 1 else ()
         if ends != (0.0, self.fraction) or min(np.diff(stages)) <= 0:
             raise ProblemError(

@@ -16,7 +16,7 @@ from colloc.gaits.gait import BILATERAL, NONE, SYMMETRIES, GaitFunction, fractio
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import JointMap
 from colloc.numerics.mesh import Mesh
-from colloc.system.arguments import STATED_IF_SET, finite_array, named_arguments
+from colloc.system.arguments import STATED_IF_SET, check_choice, finite_array, named_arguments
 from colloc.system.errors import ProblemError
 
 _SERIES, _START_SERIES = 64, 2
@@ -136,10 +136,7 @@ class LinearClass:
         return _symmetric_tables(self, n_joint)
 
     def _check_symmetry(self) -> None:
-        if self.symmetry not in SYMMETRIES:
-            raise ProblemError(
-                f"gait.symmetry must be one of {', '.join(SYMMETRIES)}, not {self.symmetry!r}."
-            )
+        check_choice(SYMMETRIES, **{"gait.symmetry": self.symmetry})
 
     def with_symmetry(self, symmetry: str) -> Any:
         return dataclasses.replace(self, symmetry=symmetry)  # type: ignore[type-var]

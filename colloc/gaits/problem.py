@@ -44,6 +44,7 @@ from colloc.numerics.schemes import scheme
 from colloc.smooth.smooth_body import schedule
 from colloc.system.arguments import (
     STATED_IF_SET,
+    check_choice,
     check_count,
     check_finite,
     check_positive,
@@ -294,9 +295,7 @@ class Problem:
             raise ProblemError(
                 f"mesh_tolerance must be 0 or lie in [1e-9, 1), not {self.mesh_tolerance:g}."
             )
-        if self.formulation not in formulations(self.body):
-            known = ", ".join(formulations(self.body))
-            raise ProblemError(f"formulation must be one of {known}, not {self.formulation!r}.")
+        check_choice(formulations(self.body), formulation=self.formulation)
         collocation = scheme(self.scheme)
         if self.gait.relative_delta and collocation.left:
             raise ProblemError(

@@ -19,7 +19,7 @@ from colloc.mechanics.inertia import GRAVITY, checked_mass
 from colloc.mechanics.law import Law, rate_independent
 from colloc.numerics.arrays import Array, namespace
 from colloc.numerics.schemes import scheme
-from colloc.system.arguments import is_number
+from colloc.system.arguments import check_finite, check_range, is_number
 from colloc.system.errors import ProblemError
 
 _ON_SLOPE = 0.02, 0.2 * DELTA_START
@@ -246,7 +246,7 @@ def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
             f"only a Chain, whose joints are its own, can be put on a slope, not "
             f"{type(body).__name__}."
         )
-    _check_grade(grade)
+    check_range(0.0, grade=grade)
     if rate_independent(body.law(friction)) and grade >= (most := body.contact.most_held(friction)):
         raise ProblemError(
             f"on a slope of grade {grade:g} the body slides down for ever: friction holds at most "
@@ -255,21 +255,11 @@ def checked_chain(body: Body, friction: Law, grade: float) -> Chain:
     return body
 
 
-def _check_grade(grade: object) -> None:
-    if not is_number(grade) or grade < 0:
-        raise ProblemError(
-            f"grade must be a number that is not negative, the tangent of the inclination, not "
-            f"{grade!r}."
-        )
-
-
 def regime_of(problem: Any) -> Regime:
     grade, towards, froude = problem.grade, problem.towards, problem.froude
-    _check_grade(grade)
-    if towards is not None and not is_number(towards):
-        raise ProblemError(
-            f"towards must be a finite angle from straight uphill, or None, not {towards!r}."
-        )
+    check_range(0.0, grade=grade)
+    if towards is not None:
+        check_finite(towards=towards)
     if grade:
         checked_chain(problem.body, problem.friction, grade)
     elif towards is not None:
@@ -289,12 +279,9 @@ def regime_of(problem: Any) -> Regime:
                 f"{' and '.join(map(repr, froude))}."
             )
         free, froude = Free(*map(float, froude)), np.sqrt(froude[0] * froude[1])
-    elif not is_number(froude) or froude < 0:
-        raise ProblemError(
-            f"froude must be a number that is not negative, length over (gravity times period^2), "
-            f"not {froude!r}."
-        )
-    elif froude and problem.uses("period"):
-        free = Free(froude, froude)
+    else:
+        check_range(0.0, froude=froude)
+        if froude and problem.uses("period"):
+            free = Free(froude, froude)
     towards = None if towards is None else float(towards)
     return Regime(grade=float(grade), towards=towards, froude=float(froude), free=free)

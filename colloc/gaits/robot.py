@@ -19,7 +19,7 @@ from colloc.gaits.regime import Free
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import PathLimit
 from colloc.mechanics.inertia import GRAVITY
-from colloc.system.arguments import is_number, named_arguments, shown
+from colloc.system.arguments import check_range, is_number, named_arguments, shown
 from colloc.system.errors import ProblemError
 
 LARGEST = 1e9  # of metres, kilograms and seconds; the smallest is its inverse
@@ -89,10 +89,8 @@ class Robot:
             )
         sizes = [("length", self.length), ("mass", self.mass), ("gravity", self.gravity)]
         for name, value in [*sizes, *(("period", x) for x in paces)]:
-            check_size(name, value)
-        for name in ("idle_power", "backlash"):
-            if not is_number(value := getattr(self, name)) or not 0 <= value <= LARGEST:
-                raise ProblemError(f"{name} must be a number from 0 on, not {shown(value)}.")
+            check_range(1 / LARGEST, LARGEST, **{name: value})
+        check_range(0.0, LARGEST, idle_power=self.idle_power, backlash=self.backlash)
         if self.length > _LONGEST:
             raise ProblemError(
                 f"length={self.length:g} is {self.length:g} metres, and at most {_LONGEST:g} are "
@@ -143,15 +141,6 @@ SPEED_OF_ROBOT = "joint speed of the robot"
 BATTERY = "battery efficiency"
 """Distance over the energy that a battery gives: work of motors that brake without regeneration,
 and idle power; in weights times length."""
-
-
-def check_size(name: str, value: Any) -> None:
-    """Raise a `ProblemError` for a length, mass, time or acceleration that no robot has."""
-    if not (is_number(value) and 1 / LARGEST <= value <= LARGEST):
-        raise ProblemError(
-            f"{name} must be a number from {1 / LARGEST:g} to {LARGEST:g} in SI units, not "
-            f"{shown(value)}."
-        )
 
 
 def _scaled(limit: Any, by: float) -> Any:

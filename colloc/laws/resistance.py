@@ -29,8 +29,7 @@ from colloc.mechanics.friction import (
 )
 from colloc.mechanics.law import Matrix
 from colloc.numerics.arrays import Array
-from colloc.system.arguments import check_positive, is_number, named_arguments
-from colloc.system.errors import ProblemError
+from colloc.system.arguments import check_positive, check_range, named_arguments
 
 
 @named_arguments
@@ -126,11 +125,7 @@ class PowerLaw(_Power):
 
     def __post_init__(self) -> None:
         check_positive(self, *self.by_name, of="friction.")
-        if not (is_number(self.power) and 0 <= self.power <= 2):
-            raise ProblemError(
-                f"friction.power must lie in [0, 2], not {self.power!r}; friction that falls with "
-                f"speed sticks."
-            )
+        check_range(0.0, 2.0, **{"friction.power": self.power})
 
     @property
     def label(self) -> str:

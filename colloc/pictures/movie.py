@@ -29,7 +29,7 @@ from colloc.results.motion import (
 )
 from colloc.results.robot import in_si
 from colloc.results.solution import SOLVED, Solution
-from colloc.system.arguments import checked_arguments
+from colloc.system.arguments import check_range, checked_arguments
 from colloc.system.errors import ProblemError
 from colloc.system.files import replaced_file
 from colloc.system.progress import StatusLine
@@ -325,8 +325,7 @@ def write_movie(
         raise ProblemError(
             f"{periods} cycles of {count:g} frames cannot be drawn; change periods, seconds or fps."
         )
-    if not 200 <= width <= 4000:
-        raise ProblemError(f"width must lie between 200 and 4000, not {width}.")
+    check_range(200, 4000, width=width)
     writers = {".gif": write_gif, ".mp4": write_mp4}
     if path.suffix not in writers:
         raise ProblemError(f"{path} should end in .gif or .mp4.")

@@ -19,7 +19,7 @@ import numpy as np
 from colloc.dynamics.chain import joint_torques as inertial_torques
 from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.problem import Problem
-from colloc.gaits.robot import SPEED_OF_ROBOT, check_size, joint_ranges, of_each, under_one_limit
+from colloc.gaits.robot import LARGEST, SPEED_OF_ROBOT, joint_ranges, of_each, under_one_limit
 from colloc.mechanics.balance import joint_moments, largest_moments
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants
@@ -35,6 +35,7 @@ from colloc.results.motion import (
     rotate,
 )
 from colloc.results.solution import Solution, direction_of_travel
+from colloc.system.arguments import check_range
 from colloc.system.environment import higher
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.trajectory import one_each, shortest_period
@@ -218,8 +219,8 @@ class RobotSheet:
     max_torque: float | Sequence[float] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("length", "mass", "period", "gravity"):
-            check_size(name, getattr(self, name))
+        sizes = {name: getattr(self, name) for name in ("length", "mass", "period", "gravity")}
+        check_range(1 / LARGEST, LARGEST, **sizes)
         problem, froude = self.solution.problem, self.solution.froude
         if froude and abs(self.froude / froude - 1.0) > _SAME_PACE:
             needed = math.sqrt(self.length / (self.pressing * froude))

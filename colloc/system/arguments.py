@@ -215,6 +215,21 @@ def check_finite(positive: bool = False, **numbers: object) -> None:
             )
 
 
+def check_range(least: float, most: float = math.inf, **numbers: object) -> None:
+    """Raise a `ProblemError` for the first value that is no number in [least, most]."""
+    for name, value in numbers.items():
+        if not is_number(value) or not least <= value <= most:
+            ends = f"of at least {least:g}" if most == math.inf else f"from {least:g} to {most:g}"
+            raise ProblemError(f"{name} must be a number {ends}, not {shown(value)}.")
+
+
+def check_choice(choices: Sequence[str], **values: object) -> None:
+    """Raise a `ProblemError` for the first value that is none of some."""
+    for name, value in values.items():
+        if value not in choices:
+            raise ProblemError(f"{name} must be one of {', '.join(choices)}, not {shown(value)}.")
+
+
 def check_count(most: float = math.inf, least: int = 1, **numbers: object) -> None:
     """Raise a `ProblemError` for the first value that is no whole number in [least, most]."""
     for name, value in numbers.items():
