@@ -163,11 +163,7 @@ def test_numbers_of_numpy_are_the_numbers_of_python(kind, field):
 def test_equal_problems_have_equal_hashes_however_their_numbers_are_written():
     feet = Foot(0, 1), Foot(1), Foot(2, 0)
     same = Foot(np.int64(0), 1.0), Foot(1, np.float32(0.5)), Foot(2, 0.0)
-    kinds = {
-        "gait": Harmonic(np.int32(1)),
-        "joint_limit": np.array(2.0),
-        "shrinking": np.bool_(False),
-    }
+    kinds = {"gait": Harmonic(np.int32(1)), "joint_limit": np.array(2.0), "shrinking": np.False_}
     laws = Friction(1, 1, 1), Friction(1.0, np.float32(1), np.int8(1))
     one = Problem("x", None, Chain(feet=feet), laws[0], Harmonic(1), joint_limit=2, intervals=24)
     other = Problem("x", None, Chain(feet=same), laws[1], **kinds, intervals=np.int64(24))

@@ -109,9 +109,7 @@ def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
     read = load(save(found, tmp_path / "cool.h5"))
     assert (read.problem.hash, read.certificate.values) == (problem.hash, values)
     assert read.problem.objective == cool
-    with pytest.raises(
-        colloc.ProblemError, match="the heat of a path depends on how fast it is followed"
-    ):
+    with pytest.raises(colloc.ProblemError, match="the heat of a path depends on how fast it is"):
         problem.with_(gait=colloc.Polygon(4, "bilateral"))
 
 
@@ -121,7 +119,7 @@ def test_a_quantity_of_your_own_is_optimised_certified_kept_and_read(tmp_path):
 def test_a_quantity_stated_anew_is_the_one_that_is_known(gait):
     mine = Objective("distance / mine", quantities=[Quantity("mine", DRIVEN_WORK.density)])
     known = Problem(
-        "known", ellipse(0.0, 2.8, 1.3), gait=gait, objective="driven efficiency", **COARSELY
+        "known", ellipse(0, 2.8, 1.3), gait=gait, objective="driven efficiency", delta=1e-2
     )
     first, second = (solve(each, starts=1) for each in (known, known.with_(objective=mine)))
     assert second.status == first.status == "solved"

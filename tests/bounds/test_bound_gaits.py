@@ -20,7 +20,7 @@ from tests.shared.mechanics import coulomb
 
 ODD = sampled.Budget(intervals=5, harmonics=(1,), shapes=10, directions=24, rounds=5, starts=40)
 DIRECTED = dataclasses.replace(ODD, harmonics=(0, 1))
-STEPS = 48
+STEPS, FOLD = 48, np.array([np.pi, 0.0])
 
 
 @cache
@@ -113,9 +113,7 @@ def test_a_bound_is_pinned_from_both_sides():
 
 def test_small_gaits_at_the_fold_generate_their_directions():
     """0.45606 at (pi, 0) from any first directions; fixed sets stop at 0.452."""
-    values = [
-        small_gait(Chain(), Friction(), np.array([np.pi, 0.0]), n, 4).efficiency for n in (60, 74)
-    ]
+    values = [small_gait(Chain(), Friction(), FOLD, n, 4).efficiency for n in (60, 74)]
     np.testing.assert_allclose(values, 0.45606, atol=2e-4)
 
 
@@ -295,6 +293,4 @@ def test_graded_splines_hold_every_cubic_exactly():
     matrix, change = (each.toarray() for each in spline.matrices(angles, np.ones_like(angles)))
     coefficients = np.linalg.lstsq(matrix, cubic(angles[0]), rcond=None)[0]
     assert np.allclose(matrix @ coefficients, cubic(angles[0]), atol=1e-10)
-    assert np.allclose(
-        change @ coefficients, -2 + 0.6 * angles[0] - 2.1 * angles[0] ** 2, atol=1e-9
-    )
+    assert np.allclose(change @ coefficients, -2 + 0.6 * angles - 2.1 * angles**2, atol=1e-9)

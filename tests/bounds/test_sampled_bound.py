@@ -62,9 +62,7 @@ def test_sums_over_few_joints_have_no_mixed_difference_in_more_and_miss_nothing(
         for corner in product((0, 1), repeat=together + 1) if together < n_joint else ():
             moves = np.append(corner, np.zeros(n_joint - together - 1))[:, None] > 0
             mixed = np.where(moves, moved, q)
-            difference = (
-                difference + (-1) ** sum(corner) * (functions(spline, mixed) @ basis).toarray()
-            )
+            difference += (-1) ** sum(corner) * (functions(spline, mixed) @ basis).toarray()
         assert np.abs(difference).max() < 1e-12
 
 
@@ -209,9 +207,7 @@ def test_minimax_program_agrees_with_a_simplex_solver():
     rows, constants = rng.standard_normal((60, 8)), rng.uniform(0.0, 1.0, 60)
     best = sampled.smallest_maximum(sparse.csr_matrix(rows), constants, sparse.csr_matrix((8, 8)))
     left = np.hstack([rows, -np.ones((60, 1))])
-    simplex = linprog(
-        np.eye(9)[8], A_ub=left, b_ub=-constants, bounds=(None, None), method="highs-ds"
-    )
+    simplex = linprog(np.eye(9)[8], left, -constants, bounds=(None, None), method="highs-ds")
     assert best.value == pytest.approx(simplex.fun, abs=1e-6)
     assert best.weights.sum() == pytest.approx(1.0, abs=1e-6)
     np.testing.assert_allclose(rows.T @ best.weights, 0.0, atol=1e-6)
@@ -398,6 +394,4 @@ def test_a_tighter_bound_is_offered_where_one_can_be_computed_alone(tmp_path, mo
 def test_no_bound_is_offered_of_gaits_that_turn_or_are_sought_for_something_else(changed):
     usual = Problem("usual", gait=Harmonic(1))
     assert refusal(usual) == ""
-    assert "of the efficiency, on the level, of gaits that do not turn" in refusal(
-        usual.with_(**changed)
-    )
+    assert "efficiency, on the level, of gaits that do not turn" in refusal(usual.with_(**changed))

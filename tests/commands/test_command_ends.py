@@ -360,10 +360,8 @@ from colloc import *
 FLOOR = Friction(mu_t=4, mu_f=1, mu_b=1)
 PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=FLOOR, delta=3e-3, mesh_tolerance=1e-4)
 """
-SEVERAL = {
-    "steer": ["--turn", "10"],
-    "pareto": ["--points", "2", "--objectives", "speed", "efficiency"],
-}
+PARETO = ["--points", "2", "--objectives", "speed", "efficiency"]
+SEVERAL = {"steer": ["--turn", "10"], "pareto": PARETO}
 
 
 @pytest.mark.parametrize("name", SEVERAL)
@@ -429,9 +427,7 @@ OF_A_USER = ("HOME", "USER", "LOGNAME", "XDG_CACHE_HOME", "LANG")
 
 
 def solved_and_verified(place, words, without, environment):
-    done = run(
-        ["solve", place / "quick.py", "--output", f"{place}/", *words], without, **environment
-    )
+    done = run(["solve", place / "quick.py", "--output", place, *words], without, **environment)
     assert done.returncode in (0, 4), done.stderr
     assert b"Traceback" not in done.stderr
     result = next(place.glob("quick*.h5"))

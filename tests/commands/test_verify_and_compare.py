@@ -111,9 +111,7 @@ def test_gaits_are_compared_where_phase_and_symmetries_bring_them_nearest(fricti
     assert gait_distance(gait, found(mean + np.array([0.1, 0.0]), cos, sin)) == pytest.approx(0.1)
     turned = -mean[::-1], -cos[::-1], -sin[::-1]
     others = {"turned": turned, "backwards": (mean, cos, -sin), "both": (*turned[:2], -turned[2])}
-    assert {
-        name for name, other in others.items() if gait_distance(gait, found(*other)) < 1e-9
-    } == alike
+    assert {name for name, at in others.items() if gait_distance(gait, found(*at)) < 1e-9} == alike
 
 
 def test_on_two_floors_gaits_are_one_by_what_both_floors_leave_alike():

@@ -260,9 +260,7 @@ def test_two_equal_links_go_nowhere_by_an_antipodal_gait():
     def distance(body):
         # no error is small beside no distance
         how = {"tolerance": 1e-4, "objective": objective_from("distance + work")}
-        return colloc.replay(
-            body, colloc.Friction(mu_t=2.0), gait, 1e-2, froude=0.1, **how
-        ).distance
+        return colloc.replay(body, colloc.Friction(mu_t=2), gait, 1e-2, froude=0.1, **how).distance
 
     assert distance(colloc.Chain((0.5, 0.5))) < 1e-6 < 1e-4 < distance(colloc.Chain((0.4, 0.6)))
 

@@ -13,7 +13,7 @@ THREE, SIX = Chain((1 / 3,) * 3), Chain((1 / 6,) * 6)
 PHASES = np.linspace(0.0, 1.0, 101)
 COSINES = np.array([2.50125, -0.00401, -0.12198, 0.00064, -0.03095])
 SINES = [0.84175, -0.00217, -0.2703, 0.00101, -0.0018]
-FIVE_HARMONICS = Fourier([0.00357, -0.00357], [COSINES, -COSINES], [SINES, SINES])
+BEST_FIVE = Fourier([0.00357, -0.00357], [COSINES, -COSINES], [SINES, SINES])
 """The optimum of five harmonics, efficiency 0.40044."""
 GAITS = {
     "Fourier": ellipse(0.2, 1.5, 1.0),
@@ -138,10 +138,8 @@ def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class
 def test_a_richer_class_keeps_what_its_seed_had():
     """From 100 times the final delta, where friction is regularised most, the search leaves this
     optimum: 0.3998."""
-    problem = Problem(
-        "five", FIVE_HARMONICS, gait=Harmonic(5, "bilateral"), delta=1.5e-3, intervals=60
-    )
-    near = warm_start(problem, FIVE_HARMONICS, Harmonic(6, "bilateral"))
+    problem = Problem("five", BEST_FIVE, gait=Harmonic(5, "bilateral"), delta=1.5e-3, intervals=60)
+    near = warm_start(problem, BEST_FIVE, Harmonic(6, "bilateral"))
     from_afar = solve(near.with_(delta_start=100 * near.delta), 1)
     assert from_afar.status == "solved"
     assert from_afar.certificate.efficiency < 0.4003

@@ -43,9 +43,7 @@ def test_on_a_slope_that_part_of_gravity_counts_which_presses(unsolved):
     period = np.exp(2.0) * (0.62 / (0.8 * 9.81)) ** 0.5
     assert found.robot().period == pytest.approx(period)
     rates = gait.rates(np.zeros(1))
-    now = Instants(
-        slope.body, slope.law, gait.angles(np.zeros(1)), rates, 1e-2, froude=found.froude
-    )
+    now = Instants(slope.body, slope.law, *gait(np.zeros(1)), 1e-2, froude=found.froude)
     np.testing.assert_allclose(uphill.at(now), rates / period / 5)
 
 

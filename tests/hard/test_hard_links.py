@@ -71,9 +71,7 @@ def test_pure_translation_and_near_it(w, delta):
         np.testing.assert_allclose(I0, LENGTH / root, rtol=1e-14)
         np.testing.assert_allclose(I2, LENGTH**3 / (12 * root), rtol=1e-14)
         assert abs(I1.item()) <= abs(w * vn) * LENGTH**3 / (12 * root**3) * (1 + 1e-10) + 5e-324
-        force = line_integrals(Friction(mu_t=2.0, mu_b=3.0)).force(
-            *column(vs, vn, w), LENGTH, delta
-        )
+        force = line_integrals(Friction(mu_t=2, mu_b=3)).force(*column(vs, vn, w), LENGTH, delta)
         np.testing.assert_allclose(force.tangential, -LENGTH * vs / root, rtol=1e-14, atol=0)
         np.testing.assert_allclose(force.normal, -2 * LENGTH * vn / root, rtol=1e-14, atol=0)
 

@@ -325,9 +325,7 @@ def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says(
     assert 0.1 < law.smallest < 10
     assert Problem.from_dict(other.with_(friction=law).to_dict()).law == law
     angles, rates = random_instants(20)
-    z, same, again = (
-        colloc.solve_balance(wheels, own, angles, rates, 1e-3).z for own in (*laws, law)
-    )
+    z, same, again = (solve_balance(wheels, own, angles, rates, 1e-3).z for own in (*laws, law))
     np.testing.assert_array_equal(z, same)
     np.testing.assert_allclose(z, again, atol=1e-9)
     stated, resolved = (
@@ -380,9 +378,7 @@ def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, th
     """The outer feet hold in turns, for a good part of the period each; a body that lies has
     none."""
     shares = on_feet.share_held
-    np.testing.assert_allclose(
-        shares, frames(on_feet, 1001).holding[:, :-1].mean(axis=1), atol=3e-3
-    )
+    np.testing.assert_allclose(shares, frames(on_feet, 1001).holding[:, :-1].mean(1), atol=3e-3)
     assert 0.25 < shares[[0, 2]].min() < shares[[0, 2]].max() < 0.5
     assert any("feet stick" in line for line in summary_lines(on_feet, None))
     # a foot holds where friction is less than 3 / sqrt(10) of the most it can be

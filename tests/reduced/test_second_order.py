@@ -161,9 +161,7 @@ def test_what_ipopt_finds_is_the_answer_where_its_checks_rest(found, monkeypatch
     """Up to what a certificate lets pass; else the gait of the search is, if it satisfies the
     first-order conditions."""
     place = ReducedProgram.place_rows
-    monkeypatch.setattr(
-        ReducedProgram, "place_rows", lambda program, v: (place(program, v), beyond)[1]
-    )
+    monkeypatch.setattr(ReducedProgram, "place_rows", lambda at, v: (place(at, v), beyond)[1])
     answer = confirm(found)
     assert answer.optimal
     assert ("beyond its limits" in answer.message) == kept

@@ -245,9 +245,7 @@ def test_cell_bounds_hold_for_whatever_the_solver_returns(potential, monkeypatch
     _, rates, angles, true = motions_inside(cells, 10, 39)
     motion = CoulombMotion(angles, rates, true.velocity[:2], true.velocity[2], true.potential)
     ratio = Samples(potential.space, motion).ratio(potential.free)[0].reshape(-1, 10).max(axis=1)
-    monkeypatch.setattr(
-        enclosure, "loaded_balance", lambda *given: loaded_balance(*given, steps=steps)
-    )
+    monkeypatch.setattr(enclosure, "loaded_balance", lambda *at: loaded_balance(*at, steps=steps))
     assert np.all(ratio <= cell_bounds(BODY, UNIT, potential, cells, 0.0))
 
 
@@ -260,9 +258,7 @@ def test_a_cell_whose_bound_is_not_a_number_stays_open(bound, potential, monkeyp
 
     monkeypatch.setattr(enclosure, "loaded_balance", broken)
     assert np.all(cell_bounds(BODY, UNIT, potential, cells, 0.0) == np.inf)
-    monkeypatch.setattr(
-        guaranteed, "cell_bounds", lambda *given: np.full(given[3].low.shape[1], np.nan)
-    )
+    monkeypatch.setattr(guaranteed, "cell_bounds", lambda *at: np.full(at[3].low.shape[1], np.nan))
     certificate = certify(*stated(bound), 0.95, deepest=0, part=(1, 500))
     assert certificate.open_cells == certificate.cells > 0
     assert certificate.guaranteed == np.inf
@@ -284,9 +280,7 @@ def test_no_gait_of_the_isotropic_body_reaches_nine_tenths(bound):
 @pytest.mark.parametrize(("target", "closed"), [(0.46, True), (0.44, False)])
 def test_on_twice_the_friction_the_bound_is_half_as_large(bound, monkeypatch, target, closed):
     """Cells are bounded for coefficients of 1: by 0.9 here."""
-    monkeypatch.setattr(
-        guaranteed, "cell_bounds", lambda *given: np.full(given[3].low.shape[1], 0.9)
-    )
+    monkeypatch.setattr(guaranteed, "cell_bounds", lambda *at: np.full(at[3].low.shape[1], 0.9))
     certificate = certify(
         *stated(bound, friction=Friction(2.0, 2.0, 2.0)), target, deepest=0, part=(1, 50)
     )
@@ -312,9 +306,7 @@ def test_parts_share_the_cells_and_these_fill_the_domain(body, monkeypatch):
         assert certify(*at, deepest=1, part=(k, 3)).open_cells == 0
     rng = np.random.default_rng(42)
     for view in {view for view, *_ in seen}:
-        low, size = (
-            np.concatenate([each[k] for each in seen if each[0] == view], axis=1) for k in (1, 2)
-        )
+        low, size = (np.hstack([each[k] for each in seen if each[0] == view]) for k in (1, 2))
         assert low.shape[1] == np.unique(low.round(12), axis=1).shape[1]
         assert size[2].min() > 0.9e-9
         for s in (-1e-10, 1e-10, 1e-7, -1e-5, 0.5, -0.93):

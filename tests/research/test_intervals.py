@@ -264,9 +264,7 @@ def test_a_reference_point_is_the_first_harmonic_and_all_else_is_beside_it(poten
     for n in range(N):
         centre = cells.low[:2, n] + 0.5 * cells.size[:2, n]
         i, j = (int(np.searchsorted(potential.spline.knots, q, side="right")) - 1 for q in centre)
-        slopes = {
-            k: [potential.largest[k, order][i, j] for order in ((1, 0), (0, 1))] for k in (1, 3)
-        }
+        slopes = {k: [potential.largest[k, d][i, j] for d in ((1, 0), (0, 1))] for k in (1, 3)}
         across = {k: cells.size[0, n] * a + cells.size[1, n] * b for k, (a, b) in slopes.items()}
         bent = [potential.largest[1, order][i, j] for order in ((2, 0), (0, 2))]
         assert found.centre[n] == pytest.approx(value(potential, 1, centre), rel=1e-8)

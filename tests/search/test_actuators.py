@@ -338,7 +338,7 @@ def test_polygons_keep_both_sides_use_them_and_mirror():
     stated = Problem("paths", gait=gait, delta=1e-2, mesh_tolerance=1e-2, smallest_shape_speed=0.4)
     here = colloc.solve(stated.with_(joint_limit=((-1, 2), (-2, 1)), guess=aside), starts=1)
     there = colloc.solve(
-        stated.with_(joint_limit=((-2, 1), (-1, 2)), guess=aside.scaled(-1.0)), starts=1
+        stated.with_(joint_limit=((-2, 1), (-1, 2)), guess=aside.scaled(-1)), starts=1
     )
     assert here.success
     assert there.efficiency == pytest.approx(here.efficiency, rel=1e-9)

@@ -158,9 +158,7 @@ def test_the_full_program_by_itself_keeps_it_too():
 
 
 def test_the_first_line_of_a_gait_that_nobody_sees_says_so(three_link):
-    problem = Problem(
-        "twitch", guess=colloc.ellipse(0, 0.06, 0.05), smallest_shape_speed=0.02, **SLIPPERY
-    )
+    problem = Problem("twitch", ellipse(0, 0.06, 0.05), smallest_shape_speed=0.02, **SLIPPERY)
     solution = colloc.evaluate(problem, problem.guess)
     assert solution.is_tiny
     assert "tiny gait" in summary_lines(solution, None)[0]

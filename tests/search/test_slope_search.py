@@ -225,9 +225,7 @@ def test_the_mesh_has_the_motion_of_the_differential_equation(problem):
 
 @pytest.mark.parametrize("problem", [SKEW, SPLINE, PATHS], ids=lambda p: p.name)
 def test_where_the_ground_is_nearly_level_a_gait_goes_up_as_far_as_on_the_level(problem):
-    (up, v), (level, w) = (
-        space_near(problem.with_(grade=grade), problem.guess) for grade in (1e-9, 0.0)
-    )
+    (up, v), (level, w) = (space_near(problem.with_(grade=g), problem.guess) for g in (1e-9, 0.0))
     found, known = (
         ReducedProgram(space, 0.01).motion.values(at, 0.01) for space, at in ((up, v), (level, w))
     )

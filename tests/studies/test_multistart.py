@@ -19,7 +19,7 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
 from colloc.mechanics.contact import crossing_depth
 from colloc.results import archive as archives
-from colloc.results.archive import ERROR, Archive, open_archive, save_archive
+from colloc.results.archive import ERROR, TIME_LIMIT, Archive, open_archive, save_archive
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.comparison import images, phase_distance, reversed_in_time
 from colloc.results.solution import SOLVED
@@ -219,7 +219,7 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
     assert (good.start, bad.start, slow.start) == (0, 1, 2)
     assert good.iterations > 0
     assert (bad.status, bad.message) == (ERROR, "ZeroDivisionError: one bad start")
-    assert slow.status == archives.TIME_LIMIT
+    assert slow.status == TIME_LIMIT
     assert "the last optimum was at delta = 1.0e-01" in slow.message
 
 
@@ -229,10 +229,7 @@ def test_a_start_without_time_for_its_first_step_ends_at_the_time_limit(monkeypa
 
     monkeypatch.setattr(campaign, "search_solve", silent)
     slow = campaign.run_guess(problem(), lambda: GAIT, 0, 1e-9)
-    assert (slow.status, slow.message) == (
-        archives.TIME_LIMIT,
-        "gave up after 1e-09 s; no optimum yet.",
-    )
+    assert (slow.status, slow.message) == (TIME_LIMIT, "gave up after 1e-09 s; no optimum yet.")
 
 
 def test_a_worker_that_dies_costs_one_start(monkeypatch):

@@ -83,16 +83,12 @@ def child(kind, folder, pipe):
         return solve([str(folder / "p.py"), "--output", str(folder), "--no-figure", "--quiet"])
     if kind == "multistart":
         campaign.run_starts = partial(campaign.run_starts, executor=ThreadPoolExecutor)
-        Archive.add = told(
-            say, kind, Archive.add, lambda archive, found: start_facts(archive.outcomes)
-        )
+        Archive.add = told(say, kind, Archive.add, lambda archive, _: start_facts(archive.outcomes))
         words = ["--output", str(folder), "--starts", "4", "--quiet"]
         return multistart([str(folder / "p.py"), *words])
     task_pool.process_pool = ThreadPoolExecutor
     appended = study_run.append_visits
-    study_run.append_visits = told(
-        say, kind, appended, lambda folder, records: attempt_facts(records)
-    )
+    study_run.append_visits = told(say, kind, appended, lambda _, visits: attempt_facts(visits))
     return sweep_study([str(folder / "s.py"), "--output", str(folder), "--quiet"])
 
 
@@ -104,9 +100,9 @@ def start_facts(outcomes):
     return {str(name): outcome.gait.cos.sum() for name, outcome in outcomes.items()}
 
 
-def attempt_facts(records):
+def attempt_facts(visits):
     return {
-        f"{r.problem_hash} {a.key}": a.outcome.gait.cos.sum() for r in records for a in r.attempts
+        f"{r.problem_hash} {a.key}": a.outcome.gait.cos.sum() for r in visits for a in r.attempts
     }
 
 

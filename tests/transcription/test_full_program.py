@@ -175,11 +175,9 @@ def test_moments_at_the_joints_are_those_that_the_power_of_single_joints_says(ca
     ("name", "order"), [("trapezoid", 2), ("hermite-simpson", 4), ("gauss-2", 4), ("radau-2", 3)]
 )
 def test_schemes_converge_at_their_order_away_from_stick(name, order):
-    def efficiency(scheme, intervals):
+    def efficiency(scheme, n):
         gait = Harmonic(1, "bilateral")
-        problem = Problem(
-            "p", ellipse(0.2, 1.1, 0.7), gait=gait, scheme=scheme, intervals=intervals
-        )
+        problem = Problem("p", ellipse(0.2, 1.1, 0.7), gait=gait, scheme=scheme, intervals=n)
         full, x, *_ = at_guess(problem, 5.0)
         return -float(full.nlp.functions["grad_f"](x, 5.0 / full.delta_unit)[0])
 
@@ -280,11 +278,9 @@ def test_multipliers_are_estimated_and_their_fill_grows_with_the_mesh_only(formu
 def test_steps_of_the_balance_solver(law, delta, mean, largest):
     rng = np.random.default_rng(0)
     angles, rates = rng.uniform(-np.pi, np.pi, (2, 2000)), rng.normal(size=(2, 2000))
-    iterations = (
-        colloc.solve_balance(Chain(), coulomb(*law), angles, rates, delta).require().iterations
-    )
-    assert iterations.mean() <= mean
-    assert iterations.max() <= largest
+    solved = colloc.solve_balance(Chain(), coulomb(*law), angles, rates, delta).require()
+    assert solved.iterations.mean() <= mean
+    assert solved.iterations.max() <= largest
 
 
 @pytest.mark.parametrize(
