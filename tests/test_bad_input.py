@@ -270,7 +270,7 @@ Chain(weights=(0.5, 0.5, 0.5)) | Chain(weights=(0.5, 0.5, 0.0)) | Chain(weights=
 Chain(weights=(1.0,)) | Chain(masses=(0.5, 0.5)) | Chain(inertias=(0.1, 0.1)) -> one for each of the 3 links
 Chain(weights=3.0) -> sequence of numbers
 Chain(masses=(0.5, 0.5, 0.5)) -> the body's mass 1
-Chain(inertias=(0.1, -0.1, 0.1)) -> must be a number of at least 0
+Chain(inertias=(0.1, -0.1, 0.1)) -> not negative
 Chain(feet=(Foot(0), Foot(3))) -> numbered 0 to 2
 Chain(feet=(Foot(0, weight=0.5), Foot(2, weight=0.4))) -> add up to 1, not 0.9
 Chain(feet=(Foot(0, 1.0, 0.5), Foot(1, 0.0, 0.5))) -> at two points at least
