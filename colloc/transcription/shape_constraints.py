@@ -19,7 +19,7 @@ from colloc.gaits.robot import Limit, joint_ranges
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.contact import Pairs, held_minimum, share_of_first
 from colloc.mechanics.densities import JointMap
-from colloc.mechanics.native_kernel import addresses, library
+from colloc.mechanics.native_kernel import addresses, native_kernel
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.peaks import SAMPLES, peaks, vertex
 from colloc.numerics.repeated import Program
@@ -155,7 +155,7 @@ class ShapeChecks:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Values, shares of the first values of contacts, and slopes, if there is room for them."""
         shares, shapes = shares.copy(), np.ascontiguousarray(shapes)
-        kernel = None if self._stretches else library()
+        kernel = None if self._stretches else native_kernel()
         if kernel is None:
             at = shapes if column is None else shapes[:, column]
             return self._evaluate_by_numpy(which, at, shares)

@@ -1,6 +1,7 @@
 """Admissible shapes of lines and strips: smooth bounds against segments and points; self-contact of all
 pairs in chains of 2 to 8 links, and the two-link body."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import product
 
@@ -16,6 +17,7 @@ from colloc.mechanics.contact import crossing_depth, far_pairs, overlapping_pair
 from colloc.search.optimise import crossing_pairs, last_free
 from colloc.transcription.full_program import FullProgram
 from colloc.transcription.shape_constraints import near_peaks, shape_checks
+from tests.shared.mechanics import numpy_instead
 from tests.shared.stages import program_of
 
 AROUND_THE_CORNER = Fourier(np.zeros(2), np.array([[2.877], [0.172]]), np.array([[0.0], [-2.872]]))
@@ -131,14 +133,16 @@ def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
 
 
 @pytest.mark.parametrize("lengths", [(0.3, 0.2, 0.15, 0.35), (0.2, 0.2, 0.3, 0.1, 0.1, 0.1)])
-def test_all_contacts_at_once_have_the_values_and_slopes_of_each_by_itself(lengths):
+@pytest.mark.parametrize("solver", [nullcontext, numpy_instead])
+def test_all_contacts_at_once_have_the_values_and_slopes_of_each_by_itself(lengths, solver):
     body = Chain(lengths, width=0.02)
     checks, q = shape_checks(body, far_pairs(body), (2.0,)), ca.SX.sym("q", body.n_joint)
     which = np.repeat(np.arange(len(checks.names)), 5)
     shapes = np.random.default_rng(4).uniform(-2.0, 2.0, (body.n_joint, which.size))
     shares = np.resize([-1.0, 0.3], which.size)
-    values = checks.values(which, shapes, shares)
-    slopes = checks.slopes(which, shapes, shares)
+    with solver():
+        values = checks.values(which, shapes, shares)
+        slopes = checks.slopes(which, shapes, shares)
     for k, contact in enumerate(body.contacts(far_pairs(body)), checks.n_angle):
         assert checks.names[k] == contact.name
         for t in np.flatnonzero(which == k):

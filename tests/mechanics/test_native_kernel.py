@@ -147,7 +147,10 @@ WITHIN_ITS_ARRAYS = """
 import numpy as np
 from colloc import Chain, Friction, solve_balance
 from colloc.mechanics import native_kernel
+from colloc.mechanics.contact import far_pairs
 from colloc.mechanics.fixed_point import motion_and_derivatives
+from colloc.mechanics.solution_branches import all_balanced_velocities
+from colloc.transcription.shape_constraints import shape_checks
 from colloc.dynamics.compiled_period import CompiledPeriod
 from colloc.dynamics.dynamics import QuasiStatic, Shapes, TotalGradient
 from colloc.numerics.mesh import Mesh
@@ -172,6 +175,11 @@ for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
         shapes = Shapes(*(each[:, : mesh.n_point] for each in at), 1e-3)
         z, out, totals = period.simulate(shapes, np.full((3, mesh.n_point), np.nan))
         period.vjp(shapes, z, out, [TotalGradient(1 + 1j, 1.0, 1.0)] * 2)
+        all_balanced_velocities(body, law, *at, 1e-4)
+    checks = shape_checks(Chain(lengths, width=0.01), far_pairs(body), (9.0,) * n)
+    which = np.repeat(np.arange(len(checks.names)), 20)
+    shapes = np.tile(at[0], len(checks.names))
+    checks.slopes(which, shapes, checks.shares(which, shapes))
 """
 
 
