@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -158,14 +158,9 @@ _SLOWEST = 0.9  # ratio of the two changes, at most, from which a limit is extra
 _FEWER = 4  # factor on the first instants of replays at smaller deltas
 
 
-class Limit(NamedTuple):
-    value: float
-    error: float
-
-
-def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limit:
-    """Limit for delta -> 0 of one gait's value, from its values at delta, delta/10 and delta/100
-    and their own errors, ``(3,)``.
+def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> tuple[float, float]:
+    """Limit for delta -> 0 of one gait's value, and its error, from its values at delta, delta/10
+    and delta/100 and their own errors, ``(3,)``.
 
     Regularisation acts like c delta at leading order, so a ninth of the last change remains;
     sticking links act like delta log delta, and gaits of the size of delta like delta squared, with
@@ -178,7 +173,7 @@ def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> Limi
     falloff = min(abs(second) / max(abs(first), 1e-300), _SLOWEST)
     left = max(max(linear, falloff / (1 - falloff)) * abs(second), linear * _DECADE * abs(first))
     own = (1 + linear) * errors[2] + linear * errors[1]
-    return Limit(float(values[2] + linear * second), float(left + own))
+    return float(values[2] + linear * second), float(left + own)
 
 
 def measure(
@@ -214,7 +209,7 @@ def measure(
             error = each.error if aim == each.objective else each.error_of(aim)
             error += float(aim.relative_error(each.values, shift))
             errors.append(abs(value) * (error + each.ambiguity_of(aim)))
-        limit = extrapolated_limit(values, errors) if smoothed else Limit(values[0], errors[0])
+        limit = extrapolated_limit(values, errors) if smoothed else (values[0], errors[0])
         numbers[f"{name}_error"] = errors[0]
         numbers[f"{name}_at_zero_delta"], numbers[of_limit] = limit
     stated = {name: fine.errors[name] + fine.others.get(name, 0.0) for name in ("distance", "work")}

@@ -235,15 +235,15 @@ def test_errors_of_a_certificate_hold(solved, name):
 def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly():
     linear = [0.25 + 3.0 * delta for delta in (1e-2, 1e-3, 1e-4)]
     found = extrapolated_limit(linear, [0.0, 0.0, 0.0])
-    assert found.value == pytest.approx(0.25, abs=1e-15)
-    assert found.error == pytest.approx(3e-4, rel=1e-9)
+    assert found[0] == pytest.approx(0.25, abs=1e-15)
+    assert found[1] == pytest.approx(3e-4, rel=1e-9)
     # other parts may hide the linear one in the last change, never by chance in both: what it
     # leaves there is allowed for
     hidden = extrapolated_limit([linear[0], linear[1], linear[1]], [0.0, 0.0, 0.0])
-    assert hidden.error == pytest.approx(3e-4, rel=1e-9)
+    assert hidden[1] == pytest.approx(3e-4, rel=1e-9)
     # the last value is moved by a ninth of the last change: so is what it may be wrong by
     errors = [7e-3, 9e-4, 2e-4]
-    assert extrapolated_limit([0.25] * 3, errors).error == pytest.approx(
+    assert extrapolated_limit([0.25] * 3, errors)[1] == pytest.approx(
         2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12
     )
 
