@@ -107,10 +107,10 @@ def test_torques_on_the_way_into_a_gait_come_to_be_those_of_the_gait(unsolved, t
     assert np.abs(jump).max() < 0.1 * np.abs(torques[:, first]).max()
 
 
-def test_a_way_on_which_the_body_crosses_itself_is_refused(three_link, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        "colloc.pictures.export.crossing_depth", lambda body, angles: np.full(angles.shape[1], 0.01)
-    )
+@pytest.mark.parametrize("how", ["crossing", "passing"])  # at samples, or between them
+def test_a_way_on_which_the_body_crosses_itself_is_refused(how, three_link, tmp_path, monkeypatch):
+    depth = np.array(0.01)
+    monkeypatch.setattr(f"colloc.pictures.export.{how}_depth", lambda body, angles: depth)
     with pytest.raises(ProblemError, match="crosses itself on the way from straight"):
         three_link.export(tmp_path / "x.csv", period=4)
     three_link.export(tmp_path / "x.csv", period=4, ramp=False)

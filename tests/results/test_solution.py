@@ -13,6 +13,7 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait import delta_per_period
 from colloc.reduced.program import ReducedProgram
 from colloc.results.motion import arc, lab_feet, part_speeds
+from colloc.results.solution import direction_of_travel
 from colloc.search.iterate import space_near
 from colloc.transcription.full_program import FullProgram
 from colloc.verification.mesh_error import mesh_error
@@ -271,3 +272,11 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
     off = values["distance"] / values["work"] / fine.efficiency - 1
     assert off == pytest.approx(error.total, abs=3e-6)
     assert abs(error.total) < error.estimate + 1e-7
+
+
+@pytest.mark.parametrize(
+    ("way", "word"), [((1, 1), "head first"), ((-1, -1), "tail first"), ((1, -1), "sideways")]
+)
+def test_a_body_that_lies_askew_travels_the_way_it_points_or_another(way, word):
+    tail = np.outer(way, [0.0, 1.0])
+    assert direction_of_travel(tail + 0.2, tail) == word

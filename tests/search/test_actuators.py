@@ -440,8 +440,11 @@ def test_between_points_of_a_mesh_less_is_allowed_to_both_sides():
     stated = USUAL.with_(guess=colloc.ellipse(0.0, 2.0, 1.3), intervals=8, delta=1e-3, **limits)
     space, v = space_near(stated, stated.guess)
     program = ReducedProgram(space, stated.delta)
-    program.place_rows(v)
-    placed = program.actuators
+    excess, placed = program.place_rows(v), program.actuators
+    at = stated.body, stated.friction, stated.guess, stated.delta
+    assert excess == pytest.approx(
+        replay(*at, limits=stated.path_limits).shares.max() - 1, abs=1e-4
+    )
     assert placed.upper.min() < 0.95
     np.testing.assert_array_equal(placed.lower[:2], -placed.upper[:2])
     assert np.isinf(placed.lower[2:]).all()
