@@ -204,9 +204,8 @@ LIMIT = 2.5
 def found():
     domain = Domain(Chain(), Friction(), LIMIT)
     space = sampled.PotentialSpace(TensorSpline(2, LIMIT, 4), (1,), True)
-    return space, *sampled.compute_bound(
-        domain, sampled.Budget(4, (1,), 10, 24, 4, 20, 1e-2, first=4)
-    )
+    budget = sampled.Budget(4, (1,), 10, 24, 4, 20, 1e-2, first=4)
+    return space, *sampled.compute_bound(domain, budget)
 
 
 def efficiency(measure):
@@ -223,9 +222,8 @@ def test_the_measure_travels_as_the_program_says(found):
 
 def test_no_potential_of_the_space_changes_what_the_measure_travels(found):
     space, _, measure = found
-    matrix, constant = Samples(space, measure.motion).rows(
-        np.arange(measure.weight.size), measure.heading
-    )
+    every = np.arange(measure.weight.size)
+    matrix, constant = Samples(space, measure.motion).rows(every, measure.heading)
     # the rate of every potential of the space vanishes in the mean, up to the penalty on roughness
     mean = measure.weight @ matrix
     sizes = np.abs(matrix).T @ measure.weight

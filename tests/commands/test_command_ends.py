@@ -442,9 +442,8 @@ def solved_and_verified(place, words, without, environment):
 
 @posix
 def test_a_solve_needs_nothing_of_the_user(place):
-    solved_and_verified(
-        place, ["--no-figure"], OF_A_USER, {**NO_LANGUAGE, "PYTHONIOENCODING": "cp1252"}
-    )
+    environment = NO_LANGUAGE | {"PYTHONIOENCODING": "cp1252"}
+    solved_and_verified(place, ["--no-figure"], OF_A_USER, environment)
 
 
 @posix

@@ -111,9 +111,7 @@ def test_the_stated_error_covers_both_directions(law, seeds):
 def test_a_period_that_is_open_at_its_ends_is_followed_around_them():
     """The phase at which a period begins changes neither its work nor its rotation."""
     path, t = random_path(3), np.arange(2000) / 2000
-    several = solution_branches.followed_motion(Instants(BODY, STEEP, *path(t), 1e-4))[1].any(
-        axis=0
-    )
+    several = solution_branches.followed_motion(Instants(BODY, STEEP, *path(t), 1e-4))[1].any(0)
     middle = t[np.flatnonzero(several)[several.sum() // 4]]
     paths = path, lambda s: path((s + middle) % 1.0)
     first, shifted = (replay(BODY, STEEP, each, 1e-4, tolerance=1e-4) for each in paths)

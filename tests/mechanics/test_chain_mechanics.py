@@ -78,9 +78,8 @@ def test_in_balance_no_force_is_left_and_joints_do_what_the_load_does_not(law, b
     solved = solve_balance(*at, load=load if size else None).require()
     motion = chain_motion(*at, solved, load if size else None)
     for k in range(0, 20, 5):
-        net, power, centre = wrench(
-            body, law, angles[:, k], rates[:, k], solved.z[:, k], 1e-3, load[:, k]
-        )
+        moving = angles[:, k], rates[:, k], solved.z[:, k]
+        net, power, centre = wrench(body, law, *moving, 1e-3, load[:, k])
         np.testing.assert_allclose(
             net, 0.0, atol=3e-4 if any(p.extent for p in body.contact.parts) else 1e-9
         )

@@ -86,9 +86,8 @@ def test_the_tangent_planes_of_the_minimum_lie_above_it_and_touch():
         1e-8,
     )
     np.testing.assert_allclose(touching.tangent_of_minimum(first, second, share), least, atol=1e-15)
-    assert np.all(
-        touching.tangent_of_minimum(first, second, rng.permutation(share)) >= least - 1e-15
-    )
+    other = touching.tangent_of_minimum(first, second, rng.permutation(share))
+    assert np.all(other >= least - 1e-15)
     ahead, behind = (touching.smooth_minimum(first + side * step, second) for side in (1, -1))
     slope = (ahead - behind) / (2 * step)
     np.testing.assert_allclose(share, slope, atol=1e-6)

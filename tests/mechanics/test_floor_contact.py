@@ -32,9 +32,8 @@ def on_each(foot, **fields):
 
 def sliding_force(body, law, delta=0.3, seed=1):
     angles, rates = random_instants(20)
-    return body.sliding(
-        law, angles, rates, np.random.default_rng(seed).normal(size=(3, 20)), delta
-    ).force
+    z = np.random.default_rng(seed).normal(size=(3, 20))
+    return body.sliding(law, angles, rates, z, delta).force
 
 
 @each_law

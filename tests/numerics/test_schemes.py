@@ -66,9 +66,8 @@ def test_peaks_are_found_inside_and_at_ends(power, off):
     at, height = peaks(lambda t: -(np.abs((t - 2.0) / 0.5 - where[:, None]) ** power), left, width)
     inside = np.clip(where, 0, 1)
     np.testing.assert_allclose((at - left) / width, inside, rtol=0, atol=off)
-    np.testing.assert_allclose(
-        height, -(np.abs(inside - where) ** power), rtol=1e-4, atol=6e-5**power
-    )
+    known = -(np.abs(inside - where) ** power)
+    np.testing.assert_allclose(height, known, rtol=1e-4, atol=6e-5**power)
 
 
 @pytest.mark.parametrize(("at", "multiplier", "added"), [(0, 1, 1), (np.pi, 1, 0), (np.pi, -1, 1)])

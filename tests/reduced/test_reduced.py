@@ -98,9 +98,7 @@ SPLINES = BSpline(8, symmetry="bilateral")
 FIVE = {"body": Chain((0.2,) * 5), "friction": Friction(mu_t=10), "guess": None}
 T = np.arange(96) / 48 * np.pi
 ELLIPSES = [np.stack([np.cos(T), -np.cos(T)]), np.stack([np.sin(T)] * 2), np.ones((2, 96))]
-FUNCTIONS = tuple(
-    lambda t, k=k: np.exp(2 * np.cos(2 * np.pi * t - k * np.pi / 2)) for k in range(4)
-)
+FUNCTIONS = [lambda t, k=k: np.exp(2 * np.cos(2 * np.pi * (t - k / 4))) for k in range(4)]
 CASES = cases(CASES, globals())
 
 

@@ -26,9 +26,8 @@ SKATING = colloc.Fourier(mean=[2.7, -2.7], cos=[[0.4], [0.0]], sin=[[0.0], [0.3]
 
 def problem(froude, **fields):
     usual = {"gait": colloc.Harmonic(1, "antipodal"), "objective": STANDING_POWER}
-    return colloc.Problem(
-        "free", froude=froude, **({"guess": ROUND, "delta": 1e-2} | usual | fields)
-    )
+    usual |= {"guess": ROUND, "delta": 1e-2}
+    return colloc.Problem("free", froude=froude, **usual | fields)
 
 
 def played(found):

@@ -36,9 +36,7 @@ def recorded(
         ends = np.stack(solution.problem.body.outline(motion.angles))[:, -1]
         c, s = np.cos(motion.theta), np.sin(motion.theta)
         ends = np.stack([c * ends[0] - s * ends[1], s * ends[0] + c * ends[1]])
-    at = {"": motion.centre, "tail_": motion.tail, "head_": motion.tail + (ends if head else 0)}[
-        point
-    ]
+    at = motion.tail + ends if head else motion.tail if point else motion.centre
     place = np.exp(1j * rng.uniform(0, 6)) * (at[0] + 1j * at[1]) + 3 - 2j
     x, y = (rng.normal(size=t.size // lasts).repeat(lasts) for _ in "xy")
     place = length * (place + noise * (x + 1j * y))

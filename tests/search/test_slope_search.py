@@ -134,9 +134,8 @@ def test_it_is_kept_verified_and_summarised_like_any_other(uphill, tmp_path, cap
 def test_a_gait_that_turns_and_points_elsewhere_fails_its_certificate(uphill):
     gait = uphill.gait
     # no gait of the class
-    turns = colloc.Fourier(
-        gait.mean + np.array([0.1, 0.2]), gait.cos, gait.sin, theta=gait.theta + 0.02
-    )
+    mean, theta = gait.mean + np.array([0.1, 0.2]), gait.theta + 0.02
+    turns = colloc.Fourier(mean, gait.cos, gait.sin, theta=theta)
     at = PROBLEM.with_(towards=0.05), turns, 1e-2, np.empty(0)
     found = gait_certificate(*at, tolerance=1e-4, claimed=uphill.value)
     holds = {check.name for check in found.checks if check.passed}
@@ -200,9 +199,7 @@ PATHS = SKEW.with_(name="sides", gait=Polygon(5), guess=None)
 
 def program_at(problem, delta):
     """A program, and a point of it with nothing special; of paths one that is closed."""
-    space, v = space_near(
-        problem, ellipse(0, 2.6, 1.3) if problem.body.n_joint == 2 else problem.guess
-    )
+    space, v = space_near(problem, ellipse(0, 2.6, 1.3))
     size = 0.0 if problem.gait.relative_delta else 0.1
     v = np.append(v[:-1] + size * np.random.default_rng(0).normal(size=v.size - 1), 0.7)
     program = ReducedProgram(space, delta)
@@ -232,9 +229,8 @@ def test_where_the_ground_is_nearly_level_a_gait_goes_up_as_far_as_on_the_level(
     turned = up.member(np.append(v[:-1], v[-1] + 0.3))
     assert up.parameters(turned)[-1] == pytest.approx(v[-1] + 0.3)
     assert found["work"] == pytest.approx(known["work"], abs=1e-7)
-    assert np.hypot(found["distance"], found["across"]) == pytest.approx(
-        known["distance"], abs=1e-7
-    )
+    way = np.hypot(found["distance"], found["across"])
+    assert way == pytest.approx(known["distance"], abs=1e-7)
     # where it points is found at a larger delta
     assert found["distance"] > 0.98 * known["distance"]
 

@@ -3,6 +3,7 @@ against plain sums over many points of the curve: nothing but its tangent angle 
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.integrate import cumulative_trapezoid
 
 import colloc
@@ -42,9 +43,9 @@ def test_many_starts_panels_and_methods_agree(motion, friction):
     other = solve_smooth(motion, friction, t, 1e-3, panels=27, order=10).require()
     slowly = {"method": "fixed_point", "max_iterations": 20000, "panels": 24}
     slow = solve_smooth(motion, friction, t, 1e-3, **slowly).require()
-    np.testing.assert_allclose(other.z, base.z, atol=2e-8)
-    np.testing.assert_allclose(slow.z, base.z, atol=2e-8)
-    np.testing.assert_allclose(other.power, base.power, atol=2e-8)
+    assert_allclose(other.z, base.z, atol=2e-8)
+    assert_allclose(slow.z, base.z, atol=2e-8)
+    assert_allclose(other.power, base.power, atol=2e-8)
 
 
 def test_scaling_of_rates_and_delta():
@@ -53,7 +54,7 @@ def test_scaling_of_rates_and_delta():
     twice = Motion(motion.angle, lambda s, t: 2 * motion.rate(s, t))
     t = np.array([0.03, 0.4])
     one, two = solve_smooth(motion, ANISOTROPIC, t, 1e-4), solve_smooth(twice, ANISOTROPIC, t, 2e-4)
-    np.testing.assert_allclose(two.z, 2 * one.z, atol=1e-9)
+    assert_allclose(two.z, 2 * one.z, atol=1e-9)
 
 
 def test_uniform_rotation_of_the_frame_is_undone():
@@ -61,9 +62,9 @@ def test_uniform_rotation_of_the_frame_is_undone():
     done."""
     turning = Motion(lambda s, t: 0.0 * s + 3.0 * t, lambda s, t: 0.0 * s + 3.0)
     solution = solve_smooth(turning, Friction(), np.array([0.0, 0.2]), 1e-6).require()
-    np.testing.assert_allclose(solution.z[2], -3.0, rtol=1e-14)
-    np.testing.assert_allclose(solution.z[:2], 0.0, atol=1e-14)
-    np.testing.assert_allclose(solution.power, 0.0, atol=1e-18)
+    assert_allclose(solution.z[2], -3.0, rtol=1e-14)
+    assert_allclose(solution.z[:2], 0.0, atol=1e-14)
+    assert_allclose(solution.power, 0.0, atol=1e-18)
 
 
 @pytest.mark.parametrize("delta", [1e-4, 1e-8, 1e-12])
@@ -83,7 +84,7 @@ def test_panels_resolve_the_layer_where_a_body_pivots(delta):
     smooth = solve_smooth(hinge, Friction(), np.array([0.1]), delta).require()
     at = np.array([[0.9]]), np.array([[1.0]]), delta
     chain = solve_balance(Chain((0.5, 0.5)), Friction(), *at).require()
-    np.testing.assert_allclose(smooth.z[:, 0], chain.z[:, 0], atol=5e-6)
+    assert_allclose(smooth.z[:, 0], chain.z[:, 0], atol=5e-6)
 
 
 def test_what_does_not_balance_is_said():
@@ -155,12 +156,10 @@ def test_force_torque_power_and_centre_of_a_sliding_body_are_sums_over_its_point
     place, velocity, along, across = plain(body, q, rates, z)
     force = friction_on(law, velocity, along, across, delta)
     stated = body.sliding(law, q, rates, z, np.full((1, 3), delta))
-    np.testing.assert_allclose(stated.force[:2], mean(force), atol=1e-5)
-    np.testing.assert_allclose(
-        stated.force[2], mean(place[0] * force[1] - place[1] * force[0]), atol=1e-5
-    )
-    np.testing.assert_allclose(stated.power[0], -mean((force * velocity).sum(axis=0)), atol=1e-5)
-    np.testing.assert_allclose(stated.centre, mean(velocity), atol=1e-5)
+    assert_allclose(stated.force[:2], mean(force), atol=1e-5)
+    assert_allclose(stated.force[2], mean(place[0] * force[1] - place[1] * force[0]), atol=1e-5)
+    assert_allclose(stated.power[0], -mean((force * velocity).sum(axis=0)), atol=1e-5)
+    assert_allclose(stated.centre, mean(velocity), atol=1e-5)
 
 
 @each_body
@@ -172,30 +171,24 @@ def test_in_balance_these_sums_vanish_and_what_bends_the_body_does_the_work(body
     motion = body.motion(law, q, rates, delta, solved)
     place, velocity, along, across = plain(body, q, rates, solved.z)
     force = friction_on(law, velocity, along, across, delta)
-    np.testing.assert_allclose(mean(force), 0.0, atol=1e-4)
-    np.testing.assert_allclose(mean(place[0] * force[1] - place[1] * force[0]), 0.0, atol=1e-4)
-    np.testing.assert_allclose(motion.centre, mean(velocity), atol=1e-5)
-    np.testing.assert_allclose(
-        motion.power, -mean((force * velocity).sum(axis=0)), rtol=1e-4, atol=1e-5
-    )
-    np.testing.assert_allclose(motion.actuator_power, motion.power, rtol=1e-6, atol=1e-6)
+    assert_allclose(mean(force), 0.0, atol=1e-4)
+    assert_allclose(mean(place[0] * force[1] - place[1] * force[0]), 0.0, atol=1e-4)
+    assert_allclose(motion.centre, mean(velocity), atol=1e-5)
+    assert_allclose(motion.power, -mean((force * velocity).sum(axis=0)), rtol=1e-4, atol=1e-5)
+    assert_allclose(motion.actuator_power, motion.power, rtol=1e-6, atol=1e-6)
 
 
 @each_body
 def test_what_is_drawn_lies_on_the_curve_and_moves_as_it_does(body):
     (q, rates, z), delta, law = shapes(body), 0.3, LAWS[0]
     place, velocity, along, across = plain(body, q, rates, z)
-    np.testing.assert_allclose(
-        np.stack(body.outline(q)), place[:, :: (POINTS - 1) // 96], atol=1e-6
-    )
-    np.testing.assert_allclose(body.centre(q), mean(place), atol=1e-6)
+    assert_allclose(np.stack(body.outline(q)), place[:, :: (POINTS - 1) // 96], atol=1e-6)
+    assert_allclose(body.centre(q), mean(place), atol=1e-6)
     # 96 chords show a sharp bump that sticks and slides to a tenth of the largest friction
     middles = (POINTS - 1) * np.arange(1, 192, 2) // 192
     where, drawn = friction_arrows(body, law, q, rates, delta, z, count=96)
-    np.testing.assert_allclose(where, place[:, middles], atol=1e-3)
-    np.testing.assert_allclose(
-        drawn, friction_on(law, velocity, along, across, delta)[:, middles], atol=0.15
-    )
+    assert_allclose(where, place[:, middles], atol=1e-3)
+    assert_allclose(drawn, friction_on(law, velocity, along, across, delta)[:, middles], atol=0.15)
 
 
 @pytest.mark.parametrize("body", [*PRESCRIBED[2:], CrawlerBody(0.2)], ids=str)
@@ -218,9 +211,7 @@ def test_between_the_breaks_of_a_bump_its_curvature_does_not_jump(body):
 def test_turning_is_the_derivative_of_the_tangent_angle_in_the_shape(body):
     (q, rates, _), s, h = shapes(body), np.linspace(0, 1, 1501)[:, None] * np.ones(3), 1e-6
     moved = (body.tangent(s, q + h * rates) - body.tangent(s, q - h * rates)) / (2 * h)
-    np.testing.assert_allclose(
-        body.turning(s, q, rates), moved, atol=1e-5 * max(np.abs(moved).max(), 1.0)
-    )
+    assert_allclose(body.turning(s, q, rates), moved, atol=1e-5 * max(np.abs(moved).max(), 1.0))
 
 
 @pytest.mark.parametrize(
@@ -239,4 +230,4 @@ def test_slopes_of_the_motion_in_balance_are_those_of_differences(body, law):
 
     numeric = np.stack([(motion(at + e)[1] - motion(at - e)[1]) / 2e-6 for e in steps], axis=1)
     _, slopes = motion_and_derivatives(body, law, at[:n], at[n:], delta, motion(at)[0])
-    np.testing.assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())
+    assert_allclose(slopes, numeric, atol=1e-6 * np.abs(numeric).max())

@@ -197,9 +197,8 @@ def test_the_paper_s_crawler_is_one_of_them():
     phases = np.array([1 / 12, 1 / 6, 1 / 3])  # half grown, grown, at the front
     shown = np.array([[p, 0.0, a, 0.0, 0.0] for p, a in ((LAP, 0.65), (LAP, 1.3), (0.0, 1.3))]).T
     assert {tuple(shape) for shape in shown.T} <= {tuple(vertex) for vertex in corners.T}
-    np.testing.assert_allclose(
-        BODY.tangent(s, shown), crawler.prescribed().angle(s, phases), atol=1e-12
-    )
+    known = crawler.prescribed().angle(s, phases)
+    np.testing.assert_allclose(BODY.tangent(s, shown), known, atol=1e-12)
 
 
 def test_the_mirrored_half_is_the_negative_shape():
@@ -239,9 +238,8 @@ def test_every_command_that_reads_results_takes_a_crawler(tmp_path, capsys):
     guess = Corners(body.concertina(1.2), "antipodal")
     gait, at = Polygon(8, "antipodal"), {"delta": 1e-3, "delta_start": 1e-3}
     problem = Problem("paper", guess, body=body, gait=gait, **at)
-    solution = colloc.Solution(
-        problem, answer_of_iterate(evaluate_at(*space_near(problem, guess), 1e-3))
-    )
+    found = evaluate_at(*space_near(problem, guess), 1e-3)
+    solution = colloc.Solution(problem, answer_of_iterate(found))
     file = str(save(solution, tmp_path / "paper.h5"))
     for command, more in (
         ("report", ""),

@@ -92,9 +92,8 @@ def test_a_reader_finishes_what_a_killed_writer_began(tmp_path):
         connection.execute("BEGIN IMMEDIATE")
         connection.execute(f"""UPDATE "{KIND}" SET value = '{"y" * 100_000}'""")
         left.write_bytes(path.read_bytes())
-        left.with_name("left.sqlite-journal").write_bytes(
-            (tmp_path / "x.sqlite-journal").read_bytes()
-        )
+        journal = (tmp_path / "x.sqlite-journal").read_bytes()
+        left.with_name("left.sqlite-journal").write_bytes(journal)
     assert read_rows(left, KIND) == {"a": "x" * 10_000}
 
 

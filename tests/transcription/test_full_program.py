@@ -203,9 +203,8 @@ def test_functions_grow_neither_with_the_mesh_nor_with_the_links():
         lengths = np.linspace(1.0, 2.0, links)
         parts = (*(lengths / lengths.sum())[:-1],)
         body = Chain((*parts, 1.0 - sum(parts)))
-        guess = colloc.Fourier(
-            np.zeros(links - 1), np.full((links - 1, 1), 0.3), np.zeros((links - 1, 1))
-        )
+        zero = np.zeros((links - 1, 1))
+        guess = colloc.Fourier(zero[:, 0], zero + 0.3, zero)
         full = program_of(Problem("p", guess, body, gait=Harmonic(1), intervals=intervals))
         return sorted(
             each.function.functions[0].n_instructions()

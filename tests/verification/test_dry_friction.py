@@ -47,9 +47,8 @@ def least_power(body, mu_t, angles, rates):
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
     cost = np.array([0.0, 0.0, 0.0, *(foot.weight for foot in body.standing_on)])
     parts = sparse.csc_matrix((3 + m, 3 + m)), cost, sparse.csc_matrix(table), right
-    return (
-        clarabel.DefaultSolver(*parts, [clarabel.SecondOrderConeT(3)] * m, settings).solve().obj_val
-    )
+    cones = [clarabel.SecondOrderConeT(3)] * m
+    return clarabel.DefaultSolver(*parts, cones, settings).solve().obj_val
 
 
 @pytest.mark.parametrize(

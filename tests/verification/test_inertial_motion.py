@@ -263,6 +263,5 @@ def test_jacobian_of_the_states_is_the_derivative_of_their_rates(grade):
     )  # fmt: skip
     states, h = np.random.default_rng(0).normal(size=14), 1e-6
     step = [moving.rates(0.3, states + s) - moving.rates(0.3, states - s) for s in h * np.eye(14)]
-    np.testing.assert_allclose(
-        moving.jacobian(0.3, states), np.transpose(step) / (2 * h), atol=1e-7
-    )
+    found = moving.jacobian(0.3, states)
+    np.testing.assert_allclose(found, np.transpose(step) / (2 * h), atol=1e-7)
