@@ -136,7 +136,9 @@ def page(name, lines=None, beside=None):
     """Words of the report, or so many lines of them, but for the drawings; of a front, too, with
     another result beside it."""
     more = {"front": front_of(name, beside), "beside": state(beside)} if beside else {}
-    words = words_of(report_page(state(name), gap="  upper bound 1", **more)).splitlines()
+    text = words_of(report_page(state(name), gap="  upper bound 1", **more))
+    # the file that states it has them, too
+    words = re.sub(r"(?s)(All fields, as solved).*(How to)", r"\1\n\2", text).splitlines()
     return "\n".join(words[: int(lines or len(words))])
 
 
