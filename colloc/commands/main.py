@@ -43,10 +43,7 @@ SUBCOMMANDS = {
     "pareto": ("families", "trade-off (Pareto front) of two objectives, as verified gaits"),
     "steer": ("families", "verified gaits from sharp right to sharp left, for a controller"),
     "evaluate": ("solve", "evaluate a gait of your own: joint angles from a CSV file"),
-    "identify": (
-        "solve",
-        "friction coefficients of a floor, from angles and path of a robot",
-    ),
+    "identify": ("solve", "friction coefficients of a floor, from angles and path of a robot"),
     "verify": ("results", "check a result again by independent replay; or compare two results"),
     "report": ("results", "one self-contained web page about a result, to read or to send"),
     "animate": ("results", "the motion as GIF or MP4"),

@@ -303,10 +303,7 @@ def robot(options: argparse.Namespace) -> int:
     return cli.OK
 
 
-@cli.command(
-    cli.RESULT,
-    cli.flag("--again", "also re-optimise for each change, and compare"),
-)
+@cli.command(cli.RESULT, cli.flag("--again", "also re-optimise for each change, and compare"))
 def sensitivity(options: argparse.Namespace) -> int:
     solution = load(options.result)
     with cli.status_line(options) as line:

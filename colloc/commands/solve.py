@@ -298,11 +298,7 @@ def bound_facts(bound: Bound | None) -> dict | None:
         least=1,
     ),
     cli.option(
-        float,
-        "--seconds S",
-        "stop after this time with the best gait so far",
-        math.inf,
-        least=0,
+        float, "--seconds S", "stop after this time with the best gait so far", math.inf, least=0
     ),
     cli.option(
         str,
@@ -408,9 +404,7 @@ _OF_A_GAIT = (
 
 
 @cli.command(
-    *_OF_A_GAIT,
-    cli.output("folder or .h5 file (default: results/GAIT-evaluated.h5)"),
-    cli.VERBOSE,
+    *_OF_A_GAIT, cli.output("folder or .h5 file (default: results/GAIT-evaluated.h5)"), cli.VERBOSE
 )
 def evaluate(options: argparse.Namespace) -> int:
     from colloc.search.evaluate import evaluate as evaluate_gait

@@ -16,13 +16,7 @@ from colloc.mechanics.balance import TAIL, Posture, instant, net_force, total_po
 from colloc.mechanics.bodies import FORMULATIONS, IMPLICIT, Body, Sliding
 from colloc.mechanics.contact import link_contacts
 from colloc.mechanics.fixed_point import chain_motion, solve_balance
-from colloc.mechanics.floor_contact import (
-    FloorContact,
-    Foot,
-    checked_feet,
-    same_feet,
-    whole_links,
-)
+from colloc.mechanics.floor_contact import FloorContact, Foot, checked_feet, same_feet, whole_links
 from colloc.mechanics.friction import LinkVelocity
 from colloc.mechanics.law import Law
 from colloc.numerics.arrays import Array, namespace

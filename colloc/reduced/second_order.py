@@ -95,10 +95,7 @@ def curvature(program: ReducedProgram, v: np.ndarray) -> Curvature:
     confirmed, far, here = values.copy(), step * _LONG_STEP / _STEP, value(v)
     for k in np.flatnonzero(values < 0):
         along = far * free @ vectors[:, k]
-        confirmed[k] = max(
-            values[k],
-            (value(v + along) - 2 * here + value(v - along)) / far**2,
-        )
+        confirmed[k] = max(values[k], (value(v + along) - 2 * here + value(v - along)) / far**2)
     first = int(np.argmin(confirmed))
     least = free @ vectors[:, first]
     # what a wrong coupling of two directions does to the smaller eigenvalue

@@ -158,8 +158,7 @@ class Solution:
     )
     mesh = property(attrgetter("answer.mesh"), doc="Mesh of the collocation, in phases.")
     delta_per_period = property(
-        attrgetter("answer.delta_per_period"),
-        doc="Regularisation speed [body lengths per period].",
+        attrgetter("answer.delta_per_period"), doc="Regularisation speed [body lengths per period]."
     )
 
     @property

@@ -81,11 +81,7 @@ def solve_subproblems(
 
 @checkpoint
 def optimise(
-    space: SearchSpace,
-    v: np.ndarray,
-    delta: float,
-    kkt: float,
-    hessian: np.ndarray | None = None,
+    space: SearchSpace, v: np.ndarray, delta: float, kkt: float, hessian: np.ndarray | None = None
 ) -> Iterate:
     """Optimum that SQP reaches from parameters v ``(n,)``, not necessarily admissible, at delta (in
     the units of the class); `NotConvergedError` if there is no periodic motion at v."""

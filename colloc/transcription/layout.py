@@ -105,11 +105,7 @@ def distance_and_work(
 
 
 def balanced_variables(
-    control: ControlProblem,
-    layout: Layout,
-    mesh: Mesh,
-    parameters: np.ndarray,
-    delta: float,
+    control: ControlProblem, layout: Layout, mesh: Mesh, parameters: np.ndarray, delta: float
 ) -> np.ndarray:
     """Variables ``(n,)`` that satisfy every equation but the closure of the rotation."""
     gaits, n_joint = control.admissible.gait, control.admissible.n_joint

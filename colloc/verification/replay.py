@@ -24,14 +24,7 @@ from colloc.gaits.objective import EFFICIENCY, Objective, chord_per_way
 from colloc.gaits.regime import LEVEL, Regime
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.chain import Chain
-from colloc.mechanics.densities import (
-    LENGTH,
-    Instants,
-    Limits,
-    Quantity,
-    limits_of,
-    quantities_of,
-)
+from colloc.mechanics.densities import LENGTH, Instants, Limits, Quantity, limits_of, quantities_of
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import FORWARDS, followed_motion
 from colloc.smooth.smooth_body import accurate_motion

@@ -12,13 +12,7 @@ from colloc.mechanics.fixed_point import solve_balance
 from colloc.mechanics.friction import Friction
 from colloc.smooth.smooth_body import Wave
 from problems import concertina, concertina_anisotropic
-from scripts.continue_epsilon import (
-    Crawler,
-    EpsilonPoint,
-    delta_for,
-    epsilon_point,
-    fitted_orders,
-)
+from scripts.continue_epsilon import Crawler, EpsilonPoint, delta_for, epsilon_point, fitted_orders
 from scripts.models.period import measured_period, snapshots
 from scripts.models.static_friction import (
     BODY,

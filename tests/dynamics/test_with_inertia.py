@@ -19,8 +19,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.search.iterate import space_near
 from colloc.verification.mesh_error import mesh_error
 from tests.shared.cases import slow, slow_but
-from tests.shared.inertia import played as with_inertia
-from tests.shared.mechanics import numpy_instead
+from tests.shared.mechanics import numpy_instead, with_inertia
 
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 ROUND = colloc.ellipse(A0=0, A1=2.5, B1=1.3)

@@ -163,10 +163,7 @@ def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
     assert excess[row, column].max() < 2.5 * (grid[1] - grid[0])
 
 
-COMMANDS = (
-    slow("report one.h5"),
-    slow("animate one.h5 --periods 1 --seconds 0.2 --width 200"),
-)
+COMMANDS = (slow("report one.h5"), slow("animate one.h5 --periods 1 --seconds 0.2 --width 200"))
 
 
 def python(*words, folder=None, **environment):
@@ -187,8 +184,7 @@ def test_commands_draw_where_the_environment_names_a_backend_that_there_is_not(
 
 
 @pytest.mark.parametrize(
-    ("before", "backend"),
-    [("", "module://no.such_name"), slow(("matplotlib, ", "svg"))],
+    ("before", "backend"), [("", "module://no.such_name"), slow(("matplotlib, ", "svg"))]
 )
 def test_a_script_draws_whatever_backend_is_named_and_one_that_there_is_stays(
     before, backend, three_link, tmp_path

@@ -45,12 +45,7 @@ STATED = {
         "torque_limit": (0.04, 0.06),
         "power_limit": 2.0,
     },
-    "weak": {
-        "joint_limit": 2.0,
-        "speed_limit": (5.2, 40.0),
-        "torque_limit": 1.5,
-        "guess": SWUNG,
-    },
+    "weak": {"joint_limit": 2.0, "speed_limit": (5.2, 40.0), "torque_limit": 1.5, "guess": SWUNG},
     "robot": {"robot": ONE, "at_least": (("distance", 0.1),), "joint_limit": 2.0},
     "small": {"robot": ONE, "joint_limit": 2.0, "guess": LOOP.scaled(0.7)},
     "turning": {"friction": UNEQUAL, "rotation": None, "guess": SKEW},

@@ -19,8 +19,7 @@ from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.smooth.balance import solve_smooth
 from colloc.verification.trajectory import plan_trajectory
 from tests.shared.cases import slow_but
-from tests.shared.inertia import played as with_inertia
-from tests.shared.mechanics import numpy_instead
+from tests.shared.mechanics import numpy_instead, with_inertia
 
 KNOWN = Path(__file__).with_name("known.json")
 EQUAL, UNEQUAL = Friction(), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)

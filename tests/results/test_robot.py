@@ -29,7 +29,7 @@ from colloc.results.motion import arc
 from colloc.results.robot import RobotSheet, in_si
 from colloc.studies.families import ParetoFront
 from colloc.verification.trajectory import plan_trajectory
-from tests.shared.inertia import played as with_inertia
+from tests.shared.mechanics import with_inertia
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
 SLOW = SIZE | {"period": 5000.0}

@@ -94,9 +94,7 @@ GIVEN |= {"scheme": ["gauss-5"], "formulation": ["implicit velocity"], "mesh_tol
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "given",
-    [{name: value} for name, values in GIVEN.items() for value in values],
-    ids=str,
+    "given", [{name: value} for name, values in GIVEN.items() for value in values], ids=str
 )
 def test_the_answer_does_not_depend_on_what_the_search_is_given(given):
     """Before, options decided: 0.234, 0.493 and 0.647 were each called solved."""

@@ -16,7 +16,7 @@ from colloc.results.robot import joint_torques
 from colloc.search.iterate import space_near
 from colloc.search.optimise import optimise
 from colloc.search.options import FINE
-from tests.shared.inertia import played as with_inertia
+from tests.shared.mechanics import with_inertia
 
 ROUND, STANDING_POWER = colloc.ellipse(A0=0, A1=2.2, B1=1.3), "distance / (work + 0.1 * period)"
 

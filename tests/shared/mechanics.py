@@ -1,12 +1,15 @@
 """Random instants of a chain, its laws, and its balance by other means than the kernel."""
 
 from contextlib import contextmanager
+from dataclasses import replace
 from unittest.mock import patch
 
 import numpy as np
 
 from colloc import Friction
+from colloc.gaits.regime import LEVEL
 from colloc.mechanics import native_kernel
+from colloc.verification.replay import replayer
 
 
 def coulomb(mu_t, mu_f, mu_b):
@@ -53,3 +56,9 @@ def numpy_instead():
     """A context in which NumPy does everything, on all threads."""
     with patch.object(native_kernel, "library", lambda: None):
         yield
+
+
+def with_inertia(body, friction, gait, delta, froude, *, regime=LEVEL, tolerance=1e-5, **asked):
+    """A period with inertia, all of which are alike."""
+    at = replayer(replace(regime, froude=froude, free=None))
+    return at(body, friction, gait, delta, tolerance=tolerance, **asked)

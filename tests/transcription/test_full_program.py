@@ -17,7 +17,7 @@ import colloc
 from colloc import Chain, Foot, Harmonic, ModalBody, Pad, Problem, Wheel, ellipse
 from colloc.mechanics.balance import joint_moments
 from colloc.mechanics.bodies import FORMULATIONS
-from colloc.numerics.repeated import least_squares_multipliers, quasi_definite_factors
+from colloc.numerics.repeated import Program, least_squares_multipliers, quasi_definite_factors
 from colloc.reduced.program import ReducedProgram
 from colloc.search import confirm
 from colloc.search.confirm import Solver, explanation
@@ -357,3 +357,13 @@ def test_a_delta_that_rounding_hides_is_named():
     result = replace(result, excess=np.zeros_like(result.excess))
     assert "at least 1e-09, below which rounding" in explanation(program, result, 1e-10)
     assert "rounding" not in explanation(program, result, 1e-9)
+
+
+def test_one_variable_in_two_places_of_a_function_has_both_mixed_derivatives():
+    """Of x y, which is then x squared."""
+    program = Program(2)
+    product = program.repeat(lambda x, y: x * y, [np.array([0, 0]), np.array([0, 1])])
+    program.objective = program.pick(product[0, :1])
+    program.add("other", program.pick(product[0, 1:]))
+    hessian = program.nlp.functions["hess_lag"]([3.0, 5.0], 1.0, 1.0, 10.0)
+    np.testing.assert_array_equal(np.array(hessian), [[2.0, 10.0], [0.0, 0.0]])

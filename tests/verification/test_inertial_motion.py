@@ -12,8 +12,7 @@ from colloc.mechanics.inertia import momentum_rates
 from colloc.numerics.mesh import Mesh
 from colloc.numerics.schemes import scheme
 from colloc.verification.differential_motion import GaitWithInertia, PeriodicRun
-from tests.shared.inertia import played as with_inertia
-from tests.shared.mechanics import wrench
+from tests.shared.mechanics import with_inertia, wrench
 
 GAIT = colloc.ellipse(A0=0, A1=2.859, B1=1.302)
 LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
