@@ -124,9 +124,11 @@ def test_a_period_has_the_same_bits_with_any_number_of_lanes(fresh, lengths):
     body, kernel = Chain(lengths), library()
     mesh = Mesh(scheme("radau-3"), np.linspace(0.0, 1.0, 8))
     rng, n = np.random.default_rng(3), body.n_joint
-    angles = rng.uniform(-3, 3, (n, mesh.n_point)) + 2e5 * (np.arange(mesh.n_point) == 5)
+    angles = rng.uniform(-3, 3, (n, mesh.n_point))
+    angles[:, 5] = 2.0**40  # whose sums are exact in any order
     shapes = Shapes(angles, rng.normal(size=(n, mesh.n_point)), 1e-3)
-    start = solve_balance(body, Friction(), *shapes[:2], 1e-3).z
+    with numpy_instead():
+        start = solve_balance(body, Friction(), *shapes[:2], 1e-3).z
     seen = []
     for lanes in (2, 4, 8)[: {2: 1, 4: 2, 8: 3}[kernel.colloc_lanes()]]:
         for name in ("colloc_period", "colloc_period_vjp"):
