@@ -190,7 +190,8 @@ def described(figure):
     for axes in figure.axes:
         rows.append(f"axes: {axes.get_title()}")
         for axis, view in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
-            ticks = [tick.get_text() for tick in axis.get_ticklabels()] if axes.axison else []
+            labelled = axes.axison and axis.get_scale() != "log"  # decades are matplotlib's choice
+            ticks = [tick.get_text() for tick in axis.get_ticklabels()] if labelled else []
             named = f"{axis.get_label_text()}: {' '.join(ticks)}"
             rows.append(f"  {named}, {axis.get_scale()}, {span(view)}")
         if legend := axes.get_legend():
