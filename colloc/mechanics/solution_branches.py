@@ -124,8 +124,8 @@ def _solve(
     library = native_kernel(moving.body, moving.friction)
     if library is not None and method == "direct" and moving.load is None:
         # most starts lead to one velocity, which is solved for to all digits once
-        near, found = kernel_balances(library, tiled, z, _TOLERANCE)
-        z[:, found] = near[:, found]
+        velocities, found = kernel_balances(library, tiled, z, _TOLERANCE)
+        z[:, found] = velocities[:, found]
         unsolved = np.flatnonzero(~repeated(found))
     part, sign = tiled.at(unsolved), np.zeros(z.shape[1])
     solved = solve_balance(

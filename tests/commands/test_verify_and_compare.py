@@ -154,8 +154,7 @@ def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_pat
 
 
 def told_of_limits(gait=LOOP, **limits):
-    """What the summary says of the limits of a gait, usually one whose joints bend by 1.2 and 0.8
-    rad at two phases."""
+    """A gait and what its summary says of its limits."""
     stated = Problem("limited", gait=colloc.Harmonic(1), delta=1e-2, **limits)
     found = evaluate(stated, gait)
     return found, [line[18:] for line in summary_lines(found, None) if line.startswith("  limits ")]
@@ -177,8 +176,7 @@ def test_the_share_of_every_limit_that_a_gait_uses_is_told():
 
 
 def test_a_limit_of_all_joints_matters_if_it_does_to_one_and_one_of_each_is_named_by_its_joint():
-    """The outer joints of four links with short ends need 0.02 at most, the inner one more than
-    that."""
+    """The outer joints of four links with short ends need 0.02 at most, the inner one more."""
     body = Chain((0.2, 0.3, 0.3, 0.2))
     wave = Fourier(np.zeros(3), [[0.2], [0.9], [0.2]], [[0.5], [0.0], [-0.5]])
     found, lines = told_of_limits(wave, body=body, torque_limit=0.1)
@@ -190,8 +188,7 @@ def test_a_limit_of_all_joints_matters_if_it_does_to_one_and_one_of_each_is_name
 
 
 def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_path):
-    """The collocated ones differ from them by more than their errors, so here they are made to
-    differ by much."""
+    """Not the collocated ones, which are made to differ by much here."""
     answer = replace(three_link.answer, value=9.0, distance=9.0, work=9.0)
     solution = replace(three_link, answer=answer)
     facts = summary_dict(replace(solution, shrunk=solution), tmp_path, None, None)

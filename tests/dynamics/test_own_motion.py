@@ -120,6 +120,7 @@ PROBLEM = Problem(
 )
 
 
+@pytest.mark.slow
 def test_a_kind_of_motion_in_one_file_is_solved_certified_kept_and_read(monkeypatch, tmp_path):
     monkeypatch.setattr(gait_fields, "MOTIONS", [Pushed])
     found = solve(PROBLEM, starts=1)

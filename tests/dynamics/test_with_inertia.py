@@ -160,6 +160,7 @@ def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypa
     assert len(asked) < 300
 
 
+@pytest.mark.slow
 def test_the_best_gait_for_the_pace_is_certified_and_beats_the_slow_one_played_fast():
     stated = colloc.Problem(
         "paced", gait=colloc.Harmonic(1, "antipodal"), froude=0.1, delta=1e-2, guess=ROUND

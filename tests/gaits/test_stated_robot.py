@@ -123,6 +123,7 @@ def whoever_speaks_of_it_says_the_same(found, tmp_path):
     assert written["period_s"] == pytest.approx(facts["period_s"], abs=0.02)
 
 
+@pytest.mark.slow
 def test_speed_and_energy_are_those_of_the_period_in_metres_and_joules(slow_robot, tmp_path):
     assert slow_robot.success
     whoever_speaks_of_it_says_the_same(slow_robot, tmp_path)
@@ -193,6 +194,7 @@ def test_a_film_of_a_robot_takes_its_time(tmp_path):
         assert film.n_frames * film.info["duration"] == pytest.approx(1500)
 
 
+@pytest.mark.slow
 def test_the_first_line_of_a_page_of_a_robot_is_in_its_units(slow_robot, tmp_path):
     page = slow_robot.report(tmp_path / "robot.html").read_text(encoding="utf-8")
     speed = 100 * in_si(slow_robot)["speed_m_per_s"]

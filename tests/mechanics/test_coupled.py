@@ -83,6 +83,7 @@ def test_limits_are_those_of_the_joints_that_move():
         assert np.abs(joints).max() == pytest.approx(limit, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_torque_and_power_are_those_of_the_motors(broken):
     """A motor that turns several joints does the work of all, with its share of each torque."""
     torques = np.random.default_rng(2).normal(size=(4, 10))

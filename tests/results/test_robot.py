@@ -170,6 +170,7 @@ def test_where_torques_depend_on_the_pace_no_other_pace_is_promised(unsolved):
             swimmer.robot(**SIZE, **{name: 1.0})
 
 
+@pytest.mark.slow
 def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, capsys):
     file = colloc.save(three_link, tmp_path / "x.h5")
     words = ["--length", "1.2", "--mass", "3", "--period", "5"]

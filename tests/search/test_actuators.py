@@ -242,6 +242,7 @@ def directions(angles):
     return np.cos(turns), np.sin(turns)
 
 
+@pytest.mark.slow
 def test_a_gait_whose_motors_limit_it_is_certified_and_uses_all_that_it_may():
     stated = {"friction": Friction(mu_t=2, mu_f=1, mu_b=1), "gait": Harmonic(1, "antipodal")}
     problem = Problem("weak", delta=1e-2, froude=0.2, torque_limit=0.2, **stated)

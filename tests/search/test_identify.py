@@ -68,6 +68,7 @@ def test_known_coefficients_lie_within_the_errors_nineteen_times_in_twenty(crawl
     assert 0.4 < np.sqrt(np.mean(np.square(off))) < 0.6  # of 24 numbers it is known to 15 %
 
 
+@pytest.mark.slow
 def test_noise_of_places_that_lasts_tells_less(crawled, tmp_path):
     paths = (recorded(tmp_path / f"{n}.csv", crawled, lasts=n) for n in (1, 8))
     once, long = (colloc.identify(FLOOR, path).coefficients["mu_t"][1] for path in paths)
@@ -221,6 +222,7 @@ def test_a_path_of_another_body_is_not_explained(crawled, tmp_path):
     assert "No coefficients reproduce the path" in str(colloc.identify(FLOOR, path))
 
 
+@pytest.mark.slow
 def test_the_command_prints_what_to_write_into_the_problem_file(crawled, tmp_path, capsys):
     recorded(tmp_path / "a.csv", crawled, per_period=40)
     problem = tmp_path / "floor.py"

@@ -479,6 +479,7 @@ def test_the_name_of_a_gait_is_the_same_in_every_process():
     assert said == start_key(gait) != start_key(other)
 
 
+@pytest.mark.slow
 def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     out = tmp_path / "out put"
     words = [str(study_file(tmp_path)), "--output", str(out)]

@@ -1,10 +1,6 @@
-"""The full program: it says what the reduced program says, its derivatives are those of its rows,
-and it grows with the mesh and the links alone; failures are named in mechanical words; and budgets of counts that no machine disturbs, iterations, evaluations,
-nonzeros, instructions (times are in benchmarks/).
-
-A budget is the count measured when it was written plus a margin of a quarter; raise one only with a
-reason.
-"""
+"""The full program says what the reduced program says, its derivatives are those of its rows, and it
+grows with mesh and links alone; failures are named in mechanical words. Budgets of counts: that when
+it was written and a quarter; raise one only with a reason."""
 
 import re
 from dataclasses import replace
