@@ -1,6 +1,5 @@
-"""The full program says what the reduced program says, its derivatives are those of its rows, and it
-grows with mesh and links alone; failures are named in mechanical words. Budgets of counts: that when
-it was written and a quarter; raise one only with a reason."""
+"""The full program says what the reduced one says, has the derivatives of its rows, grows with mesh
+and links alone. Budgets of counts: that when written and a quarter; raised with a reason alone."""
 
 import re
 from dataclasses import replace
