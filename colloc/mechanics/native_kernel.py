@@ -97,11 +97,8 @@ def library() -> ctypes.CDLL | None:
         if multiprocessing.parent_process() is None:  # workers leave it to their parent
             warnings.warn(_SLOW, SlowWarning, stacklevel=2)
         return None
-    for name in (
-        "colloc_period",
-        "colloc_period_vjp",
-        "colloc_balances",
-    ):  # of as many lanes as the processor has
+    # with as many instants side by side as suit the processor
+    for name in ("colloc_period", "colloc_period_vjp", "colloc_balances"):
         setattr(built, name, built[f"{name}_{built.colloc_lanes()}"])
     built.colloc_shape_functions.argtypes = [_TYPES[each] for each in "inppppnpppp"]
     return with_signatures(built, _SIGNATURES)
