@@ -120,11 +120,11 @@ class Objective:
 
     def __call__(self, period: Mapping[str, Any]) -> Any:
         """The value for quantities of a cycle: floats or CasADi's symbols."""
-        value = self._formula(period)
+        value = self.formula(period)
         return float(value) if isinstance(value, np.ndarray) else value
 
     @property
-    def _formula(self) -> Formula:
+    def formula(self) -> Formula:
         return formula(self.expression, self._names)
 
     @property
@@ -143,7 +143,7 @@ class Objective:
     @cached_property
     def uses(self) -> tuple[str, ...]:
         """Names of its variables, in the order of `QUANTITIES`, its own last."""
-        return tuple(name for name in self._names if name in self._formula.names)
+        return tuple(name for name in self._names if name in self.formula.names)
 
     @cached_property
     def integrals(self) -> tuple[Quantity, ...]:
@@ -173,7 +173,7 @@ class Objective:
         return sum(slope * slopes[name] for name, slope in self.partials(period).items())
 
     def partials(self, period: Mapping[str, float]) -> dict[str, float]:
-        partials = self._formula.partials({name: period[name] for name in self.uses})
+        partials = self.formula.partials({name: period[name] for name in self.uses})
         return {name: float(partials[name]) for name in self.uses}
 
     def shares(self, period: Mapping[str, float]) -> dict[str, float]:

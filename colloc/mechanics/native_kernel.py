@@ -101,6 +101,8 @@ def library() -> ctypes.CDLL | None:
     for name in ("colloc_period", "colloc_period_vjp", "colloc_balances"):
         setattr(built, name, built[f"{name}_{built.colloc_lanes()}"])
     built.colloc_shape_functions.argtypes = [_TYPES[each] for each in "inppppnpppp"]
+    built.colloc_minimize.argtypes = [_TYPES[each] for each in "ppppdppipp"]
+    built.colloc_minimize.restype = ctypes.c_longlong
     return with_signatures(built, _SIGNATURES)
 
 

@@ -6,17 +6,20 @@ Nothing but arithmetic of known variables is ever evaluated.
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from types import CodeType
 from typing import Any
+
+import numpy as np
 
 from colloc.numerics.arrays import Array, namespace
 from colloc.system.errors import ProblemError
 
 FUNCTIONS = ("sqrt", "exp", "log", "tanh", "abs", "where")
 _LONGEST = 500
+_MOST_OPERATIONS = 32  # for the kernel
 _NODES = (
     ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, ast.Compare,
     ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd, ast.Gt, ast.GtE, ast.Lt,
@@ -24,6 +27,7 @@ _NODES = (
 )  # fmt: skip
 
 
+_ARITHMETIC = ast.Add, ast.Sub, ast.Mult, ast.Div
 _RULES: dict[type[ast.operator] | str, str] = {
     ast.Add: "da + db",
     ast.Sub: "da - db",
@@ -94,6 +98,33 @@ class Formula:
     def partials(self, at: Mapping[str, Array]) -> dict[str, Array]:
         """Derivatives by each of its variables; not of a formula with ``sum``."""
         return {name: _evaluate(code, at) for name, code in self._derivatives.items()}
+
+    def operations(self, variables: Sequence[str]) -> np.ndarray | None:
+        """For the compiled kernel (native/sqp.h): how many operations there are, then each with its
+        number, operands first. None for a formula with a function or with other variables."""
+        steps: list[float] = []
+        listed = _list(self.tree.body, variables, steps)
+        few = len(steps) <= 2 * _MOST_OPERATIONS
+        return np.array([len(steps) / 2, *steps]) if listed and few else None
+
+
+def _list(node: ast.expr, variables: Sequence[str], steps: list[float]) -> bool:
+    match node:
+        case ast.Constant(float(value)):
+            steps += 0.0, value
+        case ast.Name(name) if name in variables:
+            steps += 1.0, float(variables.index(name))
+        case ast.UnaryOp(ast.USub(), operand) if _list(operand, variables, steps):
+            steps += 2.0, 0.0
+        case ast.BinOp(base, ast.Pow(), exponent) if _list(base, variables, steps):
+            steps += 7.0, float(_evaluate(_compile(exponent), {}))
+        case ast.BinOp(left, operator, right) if type(operator) in _ARITHMETIC:
+            if not (_list(left, variables, steps) and _list(right, variables, steps)):
+                return False
+            steps += float(3 + _ARITHMETIC.index(type(operator))), 0.0
+        case _:
+            return False
+    return True
 
 
 def _compile(node: ast.expr) -> CodeType:

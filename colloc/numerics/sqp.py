@@ -250,8 +250,7 @@ def minimize(
     """
     if not v.size:
         return SqpResult(v, program.objective(v), 0, False, np.empty((0, 0)))
-    v = np.clip(v, program.lower, program.upper)
-    lower, upper = np.maximum(program.lower, v - radius), np.minimum(program.upper, v + radius)
+    start, (v, lower, upper) = v, _box(program, v, radius)
     here, fresh = _Point.at(program, v), curvature is None
     b = np.eye(v.size) if curvature is None else curvature
     price, feasible = np.zeros(here.rows.size), max(accuracy, _FEASIBLE)
@@ -281,10 +280,24 @@ def minimize(
             gradient, slopes, b = new_gradient, new_slopes, _bfgs(b, here.v - before.v, turn)
             if abs(here.objective - before.objective) < accuracy and here.outside.sum() < feasible:
                 break
-    at_low = (program.lower < lower - _EDGE) & (here.v < lower + _EDGE)
-    at_high = (program.upper > upper + _EDGE) & (here.v > upper - _EDGE)
-    on_edge = bool((at_low | at_high).any())
+    on_edge = is_on_edge(program, start, radius, here.v)
     return SqpResult(here.v, here.objective, count, on_edge, b)
+
+
+def _box(
+    program: NonlinearProgram, v: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Its centre, lower and upper ends."""
+    v = np.clip(v, program.lower, program.upper)
+    return v, np.maximum(program.lower, v - radius), np.minimum(program.upper, v + radius)
+
+
+def is_on_edge(program: NonlinearProgram, start: np.ndarray, radius: float, v: np.ndarray) -> bool:
+    """True if v lies on the edge of the box around a start, and not on the program's."""
+    _, lower, upper = _box(program, start, radius)
+    at_low = (program.lower < lower - _EDGE) & (v < lower + _EDGE)
+    at_high = (program.upper > upper + _EDGE) & (v > upper - _EDGE)
+    return bool((at_low | at_high).any())
 
 
 def _line_search(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from colloc.dynamics.control_problem import ControlProblem
 from colloc.dynamics.dynamics import QuasiStatic
 from colloc.gaits.gait_fields import AnyGait
+from colloc.gaits.harmonic import Harmonic
 from colloc.gaits.regime import LEVEL
 from colloc.mechanics.contact import Pairs
 from colloc.numerics.sqp import keep_last
@@ -162,7 +165,43 @@ class LinearSpace(SearchSpace):
             most = float(excess.max(initial=-np.inf))
             return Constraints(kinds, lower, np.append(upper, np.inf), most, values, slopes)
 
-        return rows(lambda v: functions)._replace(following=lambda: rows(at_worst))
+        def kernel_rows(moving: np.ndarray) -> dict[str, Any] | None:
+            if not gaits.linear or self._n_static or (moving.size and type(gaits) is not Harmonic):
+                return None
+            low, high = (each[which[moving]] for each in checks.bounds(self._limit))
+            at = {"which": which, "shares": placed.shares, "functions": functions.T}
+            counts = {"n_shape_row": which.size, "n_moving": moving.size, "moving": moving}
+            follow = {"left": mesh.edges[cells[moving]], "width": mesh.h[cells[moving]]}
+            follow |= {"instants": times[moving], "watched_low": low, "watched_high": high}
+            return self._kernel_fields | at | counts | follow
+
+        fixed = rows(lambda v: functions)._replace(kernel_rows=kernel_rows(moving[:0]))
+        return fixed._replace(
+            following=lambda: rows(at_worst)._replace(kernel_rows=kernel_rows(moving))
+        )
+
+    @cached_property
+    def _kernel_fields(self) -> dict[str, Any]:
+        """Of the compiled kernel's search (`colloc.reduced.compiled_search`)."""
+        tables = np.array([self._table(unit).ravel() for unit in np.eye(self.n)]).T
+        function, parameter = np.nonzero(tables)
+        numbers, first = self.checks.kernel_numbers
+        speed = {"n_side": self._sides.size if self._relative else 0}
+        if self._relative:
+            speed |= {"side": self._sides, "side_rates": self._side_rates}
+        else:
+            speed["square"] = self._square
+        return speed | {
+            "matrix": self._matrix,
+            "offset": self._offset,
+            "basis": tables[function, parameter],
+            "basis_first": np.searchsorted(function, np.arange(len(tables) + 1)),
+            "basis_column": parameter,
+            "n_function": len(tables) // len(self._offset),
+            "n_shape": self.checks.n_shape,
+            "shape_numbers": numbers,
+            "shape_first": first,
+        }
 
     def _square_of_speed(self, v: np.ndarray) -> tuple[float, np.ndarray]:
         """Square of the root-mean-square shape speed [rad per radian of phase], or of the mean one

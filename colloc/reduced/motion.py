@@ -29,11 +29,14 @@ from colloc.dynamics.dynamics import (
     TotalGradient,
     Trajectory,
 )
+from colloc.gaits.gait import ANTIPODAL
+from colloc.gaits.objective import chord_per_way
 from colloc.mechanics.balance import load_wrench
 from colloc.mechanics.bodies import Body
 from colloc.mechanics.densities import Instants, JointMap, PathLimits, Quantity
 from colloc.mechanics.inertia import STATES
 from colloc.mechanics.law import Law
+from colloc.mechanics.native_kernel import chain_parameters
 from colloc.numerics.mesh import Mesh
 
 
@@ -118,6 +121,30 @@ class ReducedMotion:
         if not kind.states or along.held.all():  # a search goes on from states that there are
             self._last = state
         return state
+
+    def kernel_fields(self, state: _State) -> dict[str, Any] | None:
+        """Of the compiled kernel's search (`colloc.reduced.compiled_search`); None if the kernel
+        does not know the motion, or there is none."""
+        compiled, kind, mesh = self._compiled, self.kind, self.mesh
+        if compiled is None or not compiled.covers(state.shapes) or np.isnan(state.out).any():
+            return None
+        n_link, length, mass, law = chain_parameters(kind.body, kind.law)
+        arrays = {"A": mesh.scheme.A, "b": mesh.scheme.b, "h": mesh.h, "points": mesh.points}
+        counts = {"n_time": mesh.n_point, "n_interval": mesh.n, "n_stage": mesh.scheme.s}
+        totals = {"turn": kind.turn, "antipodal": kind.symmetry == ANTIPODAL}
+        totals |= {"repeats": kind.periods, "chord": kind.periods * chord_per_way(kind.turn)}
+        chain = {"n_link": n_link, "length": length, "mass": mass, "law": law}
+        return chain | arrays | counts | totals
+
+    def set(
+        self, v: np.ndarray, delta: float, z: np.ndarray, out: np.ndarray, totals: np.ndarray
+    ) -> None:
+        """Take a motion that the compiled kernel has found as the last one."""
+        angles, rates, pace = self._space.at(v)
+        shapes, (x, y, rotation, work) = Shapes(angles, rates, delta, pace=pace), totals.tolist()
+        passed = PeriodTotals(complex(x, y), rotation, work)
+        state = _State(v.copy(), delta, self.mesh, shapes, 0.0, z, out, None, passed)
+        self._last = self._differentiated = state
 
     def _even(self, pace: np.ndarray | float) -> float:
         """Rotation rate of axes that turn evenly, over the pace."""

@@ -4,7 +4,7 @@ actuators and path constraints are rows."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import Objective
 from colloc.mechanics.contact import Pairs
 from colloc.mechanics.densities import PathLimits
+from colloc.numerics.expression import Formula, formula
 from colloc.numerics.peaks import SAMPLES, curvature_of_moving, peaks
 from colloc.numerics.sqp import keep_last
 from colloc.reduced.motion import ReducedMotion
@@ -38,6 +39,7 @@ class Constraints(NamedTuple):
     far the gait exceeds any bound [rad, body lengths, or relative to a largest speed]. values,
     slopes: parameters ``(n,)`` to the rows ``(n_row,)`` and their derivatives ``(n_row, n)``.
     following: makes the same rows at the worst instants of whatever gait they are evaluated at.
+    kernel_rows: the same for the compiled kernel (`colloc.reduced.compiled_search`), if it can.
     """
 
     kinds: dict[str, np.ndarray]
@@ -47,6 +49,7 @@ class Constraints(NamedTuple):
     values: Callable[[np.ndarray], np.ndarray]
     slopes: Callable[[np.ndarray], np.ndarray]
     following: Callable[[], Constraints] | None = None
+    kernel_rows: dict[str, Any] | None = None
 
 
 class SearchSpace:
@@ -239,6 +242,13 @@ class ReducedProgram:
         self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
         self._slopes = keep_last(lambda v: self.motion.gradients(v, delta))
+
+    @property
+    def formulas(self) -> list[Formula]:
+        """The objective, and rows that depend on totals alone."""
+        aims = self.space.control.aims
+        rows = [formula(name, (name,)) for name in self._held]
+        return [aims.objective.formula, *rows, *(aim.formula for aim, _ in aims.at_least)]
 
     def place_rows(self, v: np.ndarray) -> float:
         """Move all rows to the worst instants of v; return how far it exceeds any bound."""

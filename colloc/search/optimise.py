@@ -14,8 +14,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +23,8 @@ from colloc.gaits.linear import enclosed_area
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.mechanics.contact import Pairs, far_pairs, link_width, overlapping_pairs
-from colloc.numerics.sqp import Stationarity, minimize, stationarity, stationarity_around
+from colloc.numerics.sqp import Stationarity, stationarity, stationarity_around
+from colloc.reduced.compiled_search import minimize, nearest
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
 from colloc.search.checkpoint import active_run, checkpoint
@@ -218,19 +217,8 @@ def project_to_zero_rotation(problem: Problem, gait: AnyGait, delta: float) -> A
     program, area = ReducedProgram(space, delta), enclosed_area(seeds, problem.body.n_joint)
     # limits of the angles are kept by the search that begins here
     program.place_rows(np.zeros_like(target))
-    enclosed = target @ area @ target
-    nearest: Any = SimpleNamespace(
-        lower=program.lower,
-        upper=program.upper,
-        row_lower=np.append(program.row_lower, enclosed),
-        row_upper=np.append(program.row_upper, enclosed),
-        objective=lambda v: 0.5 * float(np.sum((v - target) ** 2)),
-        gradient=lambda v: v - target,
-        rows=lambda v: np.append(program.rows(v), v @ area @ v),
-        row_slopes=lambda v: np.vstack([program.row_slopes(v), 2 * area @ v]),
-    )
     # few steps: a start need not be perfect
-    return space.member(minimize(nearest, target, np.inf, 1e-8, 30).v)
+    return space.member(nearest(program, target, area, 1e-8, 30))
 
 
 def refine(iterate: Iterate) -> Iterate:

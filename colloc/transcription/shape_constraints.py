@@ -70,8 +70,8 @@ class ShapeChecks:
         each = [np.array([0.0, *row]) for row in self.rows]  # 0: linear, in native/contacts.h
         each[self.n_angle : self.n_shape] = [contact.kernel_numbers for contact in self.contacts]
         first = np.cumsum([0, *(numbers.size for numbers in each)])
-        self._memory = np.concatenate([*each, np.empty(0)]), first
-        self._numbers = addresses(self._memory)
+        self.kernel_numbers = np.concatenate([*each, np.empty(0)]), first
+        self._numbers = addresses(self.kernel_numbers)
 
     def bounds(self, limit: Limit) -> tuple[np.ndarray, np.ndarray]:
         n_rate = len(self.names) - self.n_shape

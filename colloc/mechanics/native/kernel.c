@@ -195,6 +195,7 @@ static bool rescue(const Played *b, State *s, ptrdiff_t t, const double *start, 
 }
 
 #include "pose.h"
+#include "sqp.h"
 
 /* `colloc_period_N` and `colloc_period_vjp_N` of period.h with N instants side by side, as many as the processor's registers hold. */
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__)
@@ -210,12 +211,24 @@ static bool rescue(const Played *b, State *s, ptrdiff_t t, const double *start, 
 #include "lanes.h"
 #pragma GCC pop_options
 #undef LANES
+#define WITH_WIDEST(name) (WIDEST == 8 ? name##_8 : WIDEST == 4 ? name##_4 : name##_2)
 #define WIDEST (__builtin_cpu_supports("avx512f") ? 8 : __builtin_cpu_supports("avx2") ? 4 : 2)
 #else
+#define WITH_WIDEST(name) name##_2
 #define WIDEST 2
 #endif
 #define LANES 2
 #include "lanes.h"
+
+static Period *widest_period(void)
+{
+    return WITH_WIDEST(colloc_period);
+}
+
+static PeriodVjp *widest_period_vjp(void)
+{
+    return WITH_WIDEST(colloc_period_vjp);
+}
 
 /* The N that suits this processor; the numbers are the same with any. */
 int colloc_lanes(void)
