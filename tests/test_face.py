@@ -39,6 +39,8 @@ def test_importing_colloc_loads_nothing_heavy_and_shows_every_public_name():
     assert python(code) == "[] True\n"
     code = f"import sys, colloc.commands.main; HEAVY = {HEAVY[:-1]!r}; print({loaded})"
     assert python(code) == "[]\n"
+    code = "import sys, colloc.search.solve, colloc.search.evaluate; print({!r} in sys.modules)"
+    assert python(code.format("scipy.optimize")) == "False\n"
 
 
 def test_completion_offers_the_public_names_and_nothing_else():

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.special import fdtrc, stdtrit
+import scipy  # loads `optimize` and `special` where they are used
 
 from colloc.gaits.gait import GaitFunction
 from colloc.gaits.harmonic import Fourier
@@ -248,7 +247,7 @@ class _Samples(NamedTuple):
 
         def best_period(low: float, high: float) -> float:
             how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
-            return float(minimize_scalar(score, bounds=(low, high), **how).x)
+            return float(scipy.optimize.minimize_scalar(score, bounds=(low, high), **how).x)
 
         if period is not None:
             candidates = fits(period, 0)
@@ -333,7 +332,7 @@ class _Samples(NamedTuple):
         # whether more harmonics fit better than by chance (F test)
         more, left = richer.shape[1] - used, time.size - richer.shape[1]
         ratio = ((residuals**2).sum() / ((rest**2).sum() + _TINY) - 1) * left / max(more, 1)
-        by_chance = left > 0 and fdtrc(joints * more, joints * left, ratio) > _CHANCE
+        by_chance = left > 0 and scipy.special.fdtrc(joints * more, joints * left, ratio) > _CHANCE
         is_richer = more >= 1 and not by_chance
         if is_richer and left > 0:
             # what is left of the residuals is noise; where nothing is left, all of them may be
@@ -356,7 +355,7 @@ class _Samples(NamedTuple):
             change = -((along / s) @ v)[None, :, first:] / np.sqrt(orthogonal.sum() + _TINY)
             directions = np.concatenate([directions, change])
         series = Fourier.from_table(richer[:, first:]) if is_richer else None
-        return Uncertainty(directions, float(stdtrit(freedom, COVERED)), series)
+        return Uncertainty(directions, float(scipy.special.stdtrit(freedom, COVERED)), series)
 
 
 def _autocorrelation(rows: np.ndarray) -> np.ndarray:

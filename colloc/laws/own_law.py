@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar, nnls
+import scipy  # loads `optimize` where it is used, in a tenth of a second
 
 from colloc.mechanics.friction import Friction, regularised_speed
 from colloc.mechanics.law import Matrix
@@ -421,7 +421,7 @@ def _fit_direction(speed: np.ndarray, mu: np.ndarray, v_s: float) -> tuple[float
         if numbers >= mu.size - 1:
             continue
         size = np.maximum(np.abs(basis[:, terms]).max(axis=0), 1e-300)
-        fit, rest = nnls(basis[:, terms] / size, mu)
+        fit, rest = scipy.optimize.nnls(basis[:, terms] / size, mu)
         square = max(rest**2 / mu.size, (_NO_RESIDUAL * mu.max()) ** 2)
         criterion = mu.size * np.log(square) + numbers * np.log(mu.size)
         if criterion < best:
@@ -439,7 +439,7 @@ def _fit_all(speed: np.ndarray, coefficients: np.ndarray) -> tuple[float, list[n
     tried = np.log(np.geomspace(speed[speed > 0].min() / _BEYOND, speed.max() * _BEYOND, _SCAN))
     best = tried[np.argmin([score(s) for s in tried])]
     step = tried[1] - tried[0]
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         score, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-10}
     )
     v_s = float(np.exp(found.x if found.fun < score(best) else best))

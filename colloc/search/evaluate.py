@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.special import stdtrit
+import scipy  # loads `optimize` and `special` where they are used
 
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.coupled import Coupled
@@ -436,7 +435,7 @@ def identify(
     deviations, errors = np.sqrt(np.diag(covariance)), np.zeros(len(fit.names))
     errors[fit.free] = np.where(deviations < _UNTOLD, deviations, np.inf)
     values, after = fit.values(x), fit.rms(fit.off(x))
-    errors *= values * float(stdtrit(max(fit.freedom / alike, 1.0), COVERED))
+    errors *= values * float(scipy.special.stdtrit(max(fit.freedom / alike, 1.0), COVERED))
     remarks = [fit.describe(direction) for direction in untold]
     if fit.only_ratios:
         remarks.append(
@@ -581,7 +580,7 @@ class _Fit:
         """The best x, and the noise there."""
         if x.size:
             how: Any = {"bounds": (-_FARTHEST, _FARTHEST), "xtol": 1e-6}
-            x = least_squares(self.rows, x, self.slopes, **how).x
+            x = scipy.optimize.least_squares(self.rows, x, self.slopes, **how).x
         left = (np.abs(self.off(x)) ** 2).sum(axis=(1, 2))
         share = self.freedom / self.counts.sum()
         self.noise = np.sqrt(left / np.maximum(self.counts * share, 1))[:, None] + _ACCURACY
