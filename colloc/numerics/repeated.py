@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
+
+from colloc.numerics.sqp import keep_last
 
 _REGULARISATION = 1e-10  # makes a matrix of multipliers regular where equations are redundant
 
@@ -32,55 +34,205 @@ class LocalFunction:
     equations: ca.SX | None = None
 
     @cached_property
-    def functions(self) -> tuple[ca.Function, ca.Function, ca.Function, ca.Sparsity, ca.Sparsity]:
-        """Outputs, nonzeros of their Jacobian, those of the upper triangle of the Hessian of their
-        sum with weights; the patterns of these."""
-        weight = ca.SX.sym("weight", self.out.shape[0])
-        total, symbols = ca.dot(weight, self.out), [self.local, self.given, self.delta]
-        jacobian = ca.jacobian(self.out, self.local)
-        if self.solved is None or self.equations is None:
-            hessian = ca.hessian(total, self.local)[0]
-        else:
-            # R(z, y) = 0: dz/dy = -R_z^-1 R_y; the Hessian of L is that of L + nu.R along (I,
-            # dz/dy), nu = -R_z^-T L_z
-            z, equations = self.solved, self.equations
-            symbols.append(z)
-            R_z, R_y = ca.jacobian(equations, z), ca.jacobian(equations, self.local)
-            slope, nu = -ca.solve(R_z, ca.densify(R_y)), ca.SX.sym("nu", z.shape[0])
-            by_row = ca.vertcat(*(ca.jacobian(row, z) for row in ca.vertsplit(self.out)))
-            inner = ca.hessian(total + ca.dot(nu, equations), ca.vertcat(self.local, z))[0]
-            at_nu = -ca.solve(R_z.T, ca.densify(ca.jacobian(total, z).T))
-            frame = ca.vertcat(ca.SX.eye(self.local.shape[0]), slope)
-            hessian = frame.T @ ca.substitute(inner, nu, at_nu) @ frame
-            jacobian += by_row @ slope
-        jacobian, upper = ca.sparsify(jacobian), ca.sparsify(ca.triu(hessian))
-        nonzeros = [ca.densify(ca.vertcat(*part.nonzeros())) for part in (jacobian, upper)]
-        return (
-            ca.Function("local", symbols, [ca.densify(self.out)]),
-            ca.Function("jacobian", symbols, nonzeros[:1]),
-            ca.Function("hessian", [*symbols, weight], nonzeros[1:]),
-            jacobian.sparsity(),
-            upper.sparsity(),
-        )
+    def functions(self) -> Derived:
+        inputs, outputs = [self.local, self.given, self.delta], [self.out]
+        if self.solved is not None and self.equations is not None:
+            inputs, outputs = [*inputs, self.solved], [*outputs, self.equations]
+        return _derived(ca.Function("local", inputs, outputs).serialize())
+
+
+class Derived(NamedTuple):
+    """Outputs, nonzeros of their Jacobian, those of the upper triangle of the Hessian of their sum
+    with weights; the patterns of these."""
+
+    value: ca.Function
+    slopes: ca.Function
+    curvatures: ca.Function
+    jacobian: ca.Sparsity
+    upper: ca.Sparsity
+
+
+@lru_cache(maxsize=64)
+def _derived(serialized: str) -> Derived:
+    """Of the function of a `LocalFunction`: programs of one kind share them."""
+    function = ca.Function.deserialize(serialized)
+    symbols = function.sx_in()
+    (local, *_), outputs = symbols, function.call(symbols)
+    out = outputs[0]
+    weight = ca.SX.sym("weight", out.shape[0])
+    total, jacobian = ca.dot(weight, out), ca.jacobian(out, local)
+    if len(outputs) == 1:
+        hessian = ca.hessian(total, local)[0]
+    else:
+        # R(z, y) = 0: dz/dy = -R_z^-1 R_y; the Hessian of L is that of L + nu.R along (I, dz/dy),
+        # nu = -R_z^-T L_z
+        z, equations = symbols[3], outputs[1]
+        R_z, R_y = ca.jacobian(equations, z), ca.jacobian(equations, local)
+        slope, nu = -ca.solve(R_z, ca.densify(R_y)), ca.SX.sym("nu", z.shape[0])
+        by_row = ca.vertcat(*(ca.jacobian(row, z) for row in ca.vertsplit(out)))
+        inner = ca.hessian(total + ca.dot(nu, equations), ca.vertcat(local, z))[0]
+        at_nu = -ca.solve(R_z.T, ca.densify(ca.jacobian(total, z).T))
+        frame = ca.vertcat(ca.SX.eye(local.shape[0]), slope)
+        hessian = frame.T @ ca.substitute(inner, nu, at_nu) @ frame
+        jacobian += by_row @ slope
+    jacobian, upper = ca.sparsify(jacobian), ca.sparsify(ca.triu(hessian))
+    nonzeros = [ca.densify(ca.vertcat(*part.nonzeros())) for part in (jacobian, upper)]
+    return Derived(
+        ca.Function("local", symbols, [ca.densify(out)]),
+        ca.Function("jacobian", symbols, nonzeros[:1]),
+        ca.Function("hessian", [*symbols, weight], nonzeros[1:]),
+        jacobian.sparsity(),
+        upper.sparsity(),
+    )
 
 
 class Repeated(NamedTuple):
     """A local function at instances; `gather` ``(n_local, n_instance)``: indices of the local
-    variables among those of the program. `solve` takes local variables and delta, MX both, to what
-    is solved."""
+    variables among those of the program. `solve` takes local variables ``(n_local, n_instance)``
+    and delta to what is solved."""
 
     function: LocalFunction
     gather: np.ndarray
     values: np.ndarray
-    solve: Callable[[ca.MX, ca.MX], ca.MX] | None = None
+    solve: Callable[[np.ndarray, float], np.ndarray] | None = None
+
+    def columns(self, x: np.ndarray, delta: float) -> list[np.ndarray]:
+        """Arguments of the function, of all instances ``(k, n_instance)``."""
+        local = x[self.gather]
+        solved = [] if self.solve is None else [self.solve(local, delta)]
+        return [local, self.values, np.full((1, local.shape[1]), delta), *solved]
 
 
-class Nlp(NamedTuple):
+Output = tuple[ca.Sparsity, Callable[..., Any]]
+
+
+class NumPyFunction(ca.Callback):
+    """A function as CasADi calls it, whose outputs are functions by NumPy, of dense columns to
+    nonzeros. CasADi does not keep it alive."""
+
+    def __init__(self, name: str, inputs: dict[str, int], outputs: dict[str, Output]) -> None:
+        ca.Callback.__init__(self)
+        self._inputs, self._outputs = list(inputs.items()), list(outputs.items())
+        self.construct(name)
+
+    def get_n_in(self) -> int:
+        return len(self._inputs)
+
+    def get_n_out(self) -> int:
+        return len(self._outputs)
+
+    def get_name_in(self, index: int) -> str:
+        return self._inputs[index][0]
+
+    def get_name_out(self, index: int) -> str:
+        return self._outputs[index][0]
+
+    def get_sparsity_in(self, index: int) -> ca.Sparsity:
+        return ca.Sparsity.dense(self._inputs[index][1])
+
+    def get_sparsity_out(self, index: int) -> ca.Sparsity:
+        return self._outputs[index][1][0]
+
+    def has_eval_buffer(self) -> bool:
+        return True
+
+    def eval_buffer(self, inputs: Sequence[Any], outputs: Sequence[Any]) -> int:
+        columns = [np.frombuffer(each) for each in inputs if each is not None]
+        for room, (_, (_, function)) in zip(outputs, self._outputs, strict=True):
+            if room is not None:
+                np.frombuffer(room)[:] = function(*columns)
+        return 0
+
+
+class Nlp:
     """A nonlinear program in x and the parameter delta: expressions x, p, f, g; functions grad_f,
-    jac_g, hess_lag."""
+    jac_g, hess_lag. What is known of the last point is kept."""
 
-    expressions: dict[str, ca.MX]
-    functions: dict[str, ca.Function]
+    def __init__(self, program: Program) -> None:
+        self._repeated, n, m = program.repeated, program.n, program.row_lower.size
+        self._every = every = sparse.csr_matrix(sparse.vstack([program.objective, *program.rows]))
+        self._on_y = on_y = sparse.csr_matrix(every[:, n:-1].T)
+        out, along, places, start = [], [], [], 0
+        for function, gather, *_ in self._repeated:
+            *_, jacobian, upper = function.functions
+            n_out, instances = function.out.shape[0], np.arange(gather.shape[1])[:, None]
+            row, column = (np.array(k, dtype=int) for k in jacobian.get_triplet())
+            out.append((start + row + n_out * instances).ravel())
+            along.append(gather.T[:, column].ravel())
+            row, column = (np.array(k, dtype=int) for k in upper.get_triplet())
+            a, b = gather.T[:, row], gather.T[:, column]
+            # one variable in the place of two local ones has both of their mixed derivatives
+            twice = np.where((a == b) & (row != column), 2.0, 1.0)
+            places.append([k.ravel() for k in (np.minimum(a, b), np.maximum(a, b), twice)])
+            start += n_out * instances.size
+        # a slope of an output counts in every row of the output
+        outs, column = np.concatenate(out), np.concatenate(along)
+        first, count = on_y.indptr[outs], np.diff(on_y.indptr)[outs]
+        number = np.repeat(np.arange(outs.size), count)
+        at = np.arange(number.size) + (first + count - np.cumsum(count))[number]
+        linear = every[:, :n].tocoo()  # and a 1 after the slopes in what is linear
+        row = np.concatenate([on_y.indices[at], linear.row])
+        column = np.concatenate([column[number], linear.col])
+        factor = np.concatenate([on_y.data[at], linear.data])
+        number = np.concatenate([number, np.full(linear.nnz, outs.size)])
+        in_f, size = row == 0, (n, outs.size + 1)
+        entries, in_g = (factor[in_f], (column[in_f], number[in_f])), ~in_f
+        self._gradient = sparse.csr_matrix(entries, shape=size)
+        places_of_g = row[in_g] - 1, column[in_g]
+        in_jacobian = _sums((m, n), size[1], factor[in_g], places_of_g, number[in_g])
+        self._jacobian, self._on_slopes = in_jacobian
+        row, column, factor = map(np.concatenate, zip(*places, strict=True))
+        every_number = np.arange(row.size)
+        hessian, self._on_curvatures = _sums((n, n), row.size, factor, (row, column), every_number)
+        self._columns = keep_last(self._columns_at)
+        self.values, self.slopes = keep_last(self._values_at), keep_last(self._slopes_at)
+
+        at, dense, join = {"x": n, "p": 1}, ca.Sparsity.dense, np.concatenate
+        f = {"f": (dense(1), lambda *at: self.values(join(at))[:1])}
+        g = {"g": (dense(m), lambda *at: self.values(join(at))[1:])}
+        grad_f = {"grad_f_x": (dense(n), lambda *at: self.slopes(join(at))[0])}
+        pattern = _pattern(self._jacobian)
+        jac_g = {"jac_g_x": (pattern, lambda *at: self.slopes(join(at))[1].data)}
+        hess_lag = {"triu_hess_gamma_x_x": (_pattern(hessian), self._hess_lag)}
+        self.functions = {
+            "grad_f": NumPyFunction("grad_f", at, f | grad_f),
+            "jac_g": NumPyFunction("jac_g", at, g | jac_g),
+            "hess_lag": NumPyFunction("hess_lag", at | {"lam_f": 1, "lam_g": m}, hess_lag),
+        }
+        x, p = ca.MX.sym("x", n), ca.MX.sym("p")
+        f_and_g = {name[-1]: self.functions[name](x, p)[0] for name in ("grad_f", "jac_g")}
+        self.expressions = {"x": x, "p": p, **f_and_g}
+
+    def _columns_at(self, at: np.ndarray) -> list[list[np.ndarray]]:
+        return [each.columns(at[:-1], float(at[-1])) for each in self._repeated]
+
+    def _of_instances(self, kind: str, columns: list[list[np.ndarray]]) -> list[np.ndarray]:
+        functions = (getattr(each.function.functions, kind) for each in self._repeated)
+        return [_at_instances(*both) for both in zip(functions, columns, strict=True)]
+
+    def _values_at(self, at: np.ndarray) -> np.ndarray:
+        """Objective and rows, ``(1 + m,)``, at ``(x, delta)``."""
+        outputs = self._of_instances("value", self._columns(at))
+        return np.asarray(self._every @ np.concatenate([at[:-1], *outputs, [1.0]]))
+
+    def _slopes_at(self, at: np.ndarray) -> tuple[np.ndarray, sparse.csc_matrix]:
+        """Gradient of the objective ``(n,)`` and Jacobian of the rows ``(m, n)``."""
+        slopes = np.concatenate([*self._of_instances("slopes", self._columns(at)), [1.0]])
+        known = self._jacobian
+        parts = self._on_slopes @ slopes, known.indices, known.indptr
+        return self._gradient @ slopes, sparse.csc_matrix(parts, shape=known.shape)
+
+    def _hess_lag(
+        self, x: np.ndarray, delta: np.ndarray, on_f: np.ndarray, on_g: np.ndarray
+    ) -> np.ndarray:
+        weights, columns, start = self._on_y @ np.append(on_f, on_g), [], 0
+        for each, given in zip(self._repeated, self._columns(np.append(x, delta)), strict=True):
+            shape = each.gather.shape[1], each.function.out.shape[0]
+            end = start + shape[0] * shape[1]
+            columns.append([*given, weights[start:end].reshape(shape).T])
+            start = end
+        curvatures = self._of_instances("curvatures", columns)
+        return np.asarray(self._on_curvatures @ np.concatenate(curvatures))
 
 
 class Program:
@@ -148,71 +300,42 @@ class Program:
 
     @cached_property
     def nlp(self) -> Nlp:
-        n, m = self.n, self.row_lower.size
-        x, delta = ca.MX.sym("x", n), ca.MX.sym("delta")
-        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", m)
-        every = sparse.csr_matrix(sparse.vstack([self.objective, *self.rows]))
-        on_x, on_y, constant = (
-            every[:, a:b] for a, b in ((0, n), (n, n + self._n_y), (n + self._n_y, None))
-        )
-        weights = _dm(on_y.T) @ ca.vertcat(lam_f, lam_g)
-        outputs, slopes, curvatures = [], [], []
-        jac_places, hess_places, start = [], [], 0
-        for function, gather, values, solve in self.repeated:
-            n_out, n_instance = function.out.shape[0], gather.shape[1]
-            local = ca.reshape(x[gather.ravel(order="F").tolist()], *gather.shape)
-            arguments = [local, ca.DM(values), ca.repmat(delta, 1, n_instance)]
-            arguments += [] if solve is None else [solve(local, delta)]
-            own = ca.reshape(weights[start : start + n_out * n_instance], n_out, n_instance)
-            value, slope, curvature, jacobian, upper = function.functions
-            outputs.append(ca.vec(value.map(n_instance)(*arguments)))
-            slopes.append(ca.vec(slope.map(n_instance)(*arguments)))
-            curvatures.append(ca.vec(curvature.map(n_instance)(*arguments, own)))
-            row, column = (np.array(k, dtype=int) for k in jacobian.get_triplet())
-            out = start + row[:, None] + n_out * np.arange(n_instance)
-            jac_places.append((out, gather[column], np.ones(out.shape)))
-            row, column = (np.array(k, dtype=int) for k in upper.get_triplet())
-            a, b = gather[row], gather[column]
-            # one variable in the place of two local ones has both of their mixed derivatives
-            twice = np.where((a == b) & (row != column)[:, None], 2.0, 1.0)
-            hess_places.append((np.minimum(a, b), np.maximum(a, b), twice))
-            start += n_out * n_instance
-        values = _dm(on_x) @ x + _dm(on_y) @ ca.vertcat(*outputs) + _dm(constant)
-        slope_of_y = _matrix((start, n), jac_places, ca.vertcat(*slopes))
-        whole = _dm(on_x) + _dm(on_y) @ slope_of_y
-        hessian = _matrix((n, n), hess_places, ca.vertcat(*curvatures))
-        f, g, gradient, jac_g = values[0], values[1:], ca.densify(whole[0, :].T), whole[1:, :]
-        ins, multipliers = ["x", "p"], ["lam_f", "lam_g"]
-        return Nlp(
-            {"x": x, "p": delta, "f": f, "g": g},
-            {
-                "grad_f": ca.Function("grad_f", [x, delta], [f, gradient], ins, ["f", "grad_f_x"]),
-                "jac_g": ca.Function("jac_g", [x, delta], [g, jac_g], ins, ["g", "jac_g_x"]),
-                "hess_lag": ca.Function(
-                    "hess_lag", [x, delta, lam_f, lam_g], [hessian], [*ins, *multipliers],
-                    ["triu_hess_gamma_x_x"],
-                ),
-            },
-        )  # fmt: skip
+        return Nlp(self)
 
 
-def _matrix(shape: tuple[int, int], places: list, values: ca.MX) -> ca.MX:
-    """Sparse matrix with entries at places (row, column, factor), each ``(n_entry,
-    n_instance)``."""
-    row, column, factor = (
-        np.concatenate([part[k].ravel(order="F") for part in places]) for k in range(3)
-    )
+def _sums(
+    shape: tuple[int, int],
+    n_number: int,
+    factor: np.ndarray,
+    places: tuple[np.ndarray, np.ndarray],
+    number: np.ndarray,
+) -> tuple[sparse.csc_matrix, sparse.csr_matrix]:
+    """The pattern of a matrix to which numbers, times factors, are added at places (row, column);
+    and the matrix from the numbers to its nonzeros."""
+    row, column = places
     key, place = np.unique(column.astype(np.int64) * shape[0] + row, return_inverse=True)
-    sums = sparse.csr_matrix((factor, (place, np.arange(row.size))), shape=(key.size, row.size))
-    rows, columns = (key % shape[0]).tolist(), (key // shape[0]).tolist()
-    return ca.MX(ca.Sparsity.triplet(*shape, rows, columns), _dm(sums) @ values)
+    rows, ends = key % shape[0], np.searchsorted(key, shape[0] * np.arange(shape[1] + 1))
+    pattern = sparse.csc_matrix((np.ones(key.size), rows, ends), shape=shape)
+    return pattern, sparse.csr_matrix((factor, (place, number)), shape=(key.size, n_number))
 
 
-def _dm(matrix: sparse.spmatrix) -> ca.DM:
-    csc = sparse.csc_matrix(matrix)
-    csc.sort_indices()
-    pattern = ca.Sparsity(*csc.shape, csc.indptr.tolist(), csc.indices.tolist())
-    return ca.DM(pattern, csc.data.tolist())
+def _pattern(matrix: sparse.csc_matrix) -> ca.Sparsity:
+    return ca.Sparsity(*matrix.shape, matrix.indptr.tolist(), matrix.indices.tolist())
+
+
+def _at_instances(function: ca.Function, columns: list[np.ndarray]) -> np.ndarray:
+    """Values of a function of columns, one instance after the other."""
+    n_instance = columns[0].shape[1]
+    values = np.empty(function.nnz_out(0) * n_instance)
+    if values.size:
+        buffer, evaluate = function.map(n_instance).buffer()
+        arguments = [each.ravel(order="F") for each in columns]  # held till the end
+        for k, each in enumerate(arguments):
+            if each.size:
+                buffer.set_arg(k, memoryview(each))  # type: ignore[arg-type]
+        buffer.set_res(0, memoryview(values))  # type: ignore[arg-type]
+        evaluate()
+    return values
 
 
 def quasi_definite_factors(jacobian: sparse.csr_matrix) -> SuperLU:

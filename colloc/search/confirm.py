@@ -10,7 +10,6 @@ Where a solve fails, the message says why: which equation, which link, which tim
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -26,8 +25,8 @@ from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.problem import Problem
 from colloc.mechanics.contact import far_pairs
 from colloc.numerics.mesh import Mesh
-from colloc.numerics.repeated import least_squares_multipliers
-from colloc.numerics.sqp import keep_last, stationarity
+from colloc.numerics.repeated import NumPyFunction, least_squares_multipliers
+from colloc.numerics.sqp import stationarity
 from colloc.reduced.program import ReducedProgram, SearchSpace
 from colloc.reduced.second_order import curvature
 from colloc.results.answer import NOT_MEASURED, PRESCRIBED, REDUCED, Answer, SecondOrder, Step
@@ -99,23 +98,23 @@ class Solver:
         self._settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         off = ("print_time", "calc_lam_p", "calc_lam_x", "calc_f", "calc_g", "error_on_fail")
         self._settings |= dict.fromkeys(off, False) | {"no_nlp_grad": True}
-        # held here: CasADi does not keep it alive
-        self._stop = StopRequest(self._nlp.expressions)
+        sizes = {x: self._nlp.expressions[x.removeprefix("lam_")].numel() for x in ca.nlpsol_out()}
+        ends = {"stop": (ca.Sparsity.dense(1), lambda *_: is_interrupted())}
+        self._stop = NumPyFunction("stop_request", sizes, ends)  # held here, as CasADi does not
         self._settings |= {**self._nlp.functions, "iteration_callback": self._stop}
-        self._values_and_slopes = keep_last(self._evaluate)
 
     @cached_property
     def _solver(self) -> ca.Function:
         return ca.nlpsol("colloc", "ipopt", self._nlp.expressions, self._settings)
 
-    def _evaluate(self, at: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, sparse.csr_matrix]:
-        """Objective, gradient ``(n,)``, rows ``(m,)`` and Jacobian ``(m, n)`` at ``(x, delta)``."""
-        x, delta = at[:-1], at[-1] / self.program.delta_unit
-        f, gradient = self._nlp.functions["grad_f"](x, delta)
-        g, jacobian = self._nlp.functions["jac_g"](x, delta)
-        parts = jacobian.nonzeros(), jacobian.row(), jacobian.colind()
-        slopes = sparse.csc_matrix(parts, shape=jacobian.shape).tocsr()
-        return float(f), gradient.full().ravel(), g.full().ravel(), slopes
+    def _values_and_slopes(
+        self, x: np.ndarray, delta: float
+    ) -> tuple[float, np.ndarray, np.ndarray, sparse.csc_matrix]:
+        """Objective, gradient ``(n,)``, rows ``(m,)`` and Jacobian ``(m, n)``."""
+        at = np.append(x, delta / self.program.delta_unit)
+        (f, *_), g = np.split(self._nlp.values(at), [1])
+        gradient, jacobian = self._nlp.slopes(at)
+        return float(f), gradient, g, jacobian
 
     def solve_within(
         self,
@@ -165,7 +164,7 @@ class Solver:
         """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's
         gradient."""
         t = self.program
-        _, gradient, _, slopes = self._values_and_slopes(np.append(x, delta))
+        _, gradient, _, slopes = self._values_and_slopes(x, delta)
         lam_g = np.where(t.row_lower == t.row_upper, 0.0, lam_g)
         gradient = gradient + slopes.T @ lam_g + lam_x
         jacobian, equality = self.equality_jacobian(x, delta)
@@ -178,7 +177,7 @@ class Solver:
         """Jacobian of the equations in the free variables at x, and their row numbers."""
         t = self.program
         equality = np.flatnonzero(t.row_lower == t.row_upper)
-        jacobian = self._values_and_slopes(np.append(x, delta))[3]
+        jacobian = self._values_and_slopes(x, delta)[3].tocsr()
         return jacobian[equality][:, t.lower < t.upper], equality
 
     def _result(
@@ -192,7 +191,7 @@ class Solver:
         ended: tuple[str, int, float],
     ) -> NlpResult:
         t, free = self.program, self.program.lower < self.program.upper
-        f, gradient, g, jacobian = self._values_and_slopes(np.append(x, delta))
+        f, gradient, g, jacobian = self._values_and_slopes(x, delta)
         stationarity = gradient + jacobian.T @ lam_g + lam_x
         outside = np.maximum(np.maximum(t.row_lower - g, g - t.row_upper), 0.0)
         bounds_outside = np.maximum(np.maximum(lower - x, x - upper), 0.0)
@@ -232,29 +231,6 @@ def solve_in_regions(
         further = Solver(program, options).solve_within(x, delta, None, radius)
         result = further.accumulate(result)
     return program, replace(result, complementarity=np.inf, status="still moving")
-
-
-class StopRequest(ca.Callback):
-    """Ends IPOPT once Ctrl-C came."""
-
-    def __init__(self, nlp: Mapping[str, ca.MX]) -> None:
-        ca.Callback.__init__(self)
-        self._sparsity = {
-            name: nlp[name.removeprefix("lam_")].sparsity() for name in ca.nlpsol_out()
-        }
-        self.construct("stop_request")
-
-    def get_n_in(self) -> int:
-        return ca.nlpsol_n_out()
-
-    def get_name_in(self, index: int) -> str:
-        return ca.nlpsol_out(index)
-
-    def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        return self._sparsity[ca.nlpsol_out(index)]
-
-    def eval(self, arguments: list[ca.DM]) -> list[int]:
-        return [int(is_interrupted())]
 
 
 _MEANING = {

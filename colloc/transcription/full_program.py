@@ -59,7 +59,6 @@ from colloc.mechanics.friction import LinkForce, line_integrals
 from colloc.mechanics.inertia import STATES, turning
 from colloc.mechanics.law import Law
 from colloc.numerics.repeated import LocalFunction, Program, Repeated
-from colloc.numerics.sqp import keep_last
 from colloc.transcription.layout import RADIANS, balanced_variables, layout_of
 from colloc.transcription.shape_constraints import ShapeLimits
 
@@ -87,53 +86,29 @@ def velocity_map(body: Body, law: Law, *, relative: bool = False) -> LocalFuncti
     return LocalFunction(local, ca.SX(0, 1), delta, out, solved, balanced.force)
 
 
-class BalancedVelocity(ca.Callback):
-    """(angles, rates, start, delta) to balanced tail velocities ``(3, n_time)``, cached; NaN where
-    the balance does not converge."""
+class BalancedVelocity:
+    """Tail velocities ``(3, n_time)`` that balance a body, of (theta, angles, rates, start) and
+    delta; NaN where the balance does not converge."""
 
-    def __init__(self, body: Body, friction: Law, n_time: int) -> None:
-        ca.Callback.__init__(self)
-        self._body, self._friction = body, friction
-        sizes = (body.n_joint, n_time), (body.n_joint, n_time), (3, n_time), (1, 1)
-        self._inputs = [ca.Sparsity.dense(*size) for size in sizes]
-        self._z, self._start, self.solves = np.full((3, n_time), np.nan), np.empty(0), 0
-        self._balanced = keep_last(self._solve)
-        self.construct("velocity_map", {"enable_fd": False})
+    def __init__(self, body: Body, friction: Law, *, relative: bool) -> None:
+        self._body, self._friction, self._relative = body, friction, relative
+        self._last, self.solves = np.empty(0), 0
 
-    def of_local(self, local: ca.MX, delta: ca.MX, *, relative: bool) -> ca.MX:
-        ends = np.cumsum([1, self._body.n_joint, self._body.n_joint]).tolist()
-        _, q, r, start = ca.vertsplit(local, [0, *ends, local.shape[0]])
-        if not relative:
-            return self(q, r, start, delta)
-        speed = ca.sqrt(ca.sum1(r * r))  # Z grows like r and delta
-        unit, start = (each / ca.repmat(speed, each.size1(), 1) for each in (r, start))
-        return ca.repmat(speed, 3, 1) * self(q, unit, start, delta)
-
-    def get_n_in(self) -> int:
-        return len(self._inputs)
-
-    def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        return self._inputs[index]
-
-    def get_sparsity_out(self, index: int) -> ca.Sparsity:
-        return self._inputs[2]
-
-    def eval(self, arguments: list[ca.DM]) -> list[ca.DM]:
-        angles, rates, self._start = (a.full() for a in arguments[:3])
-        at = np.concatenate([angles.ravel(), rates.ravel(), [float(arguments[3])]])
-        return [
-            ca.DM(self._balanced(at) if np.isfinite(at).all() else np.full_like(self._z, np.nan))
-        ]
-
-    def _solve(self, at: np.ndarray) -> np.ndarray:
-        angles, rates = at[:-1].reshape(2, self._body.n_joint, -1)
-        start = self._z if np.isnan(self._start).any() else self._start
+    def __call__(self, local: np.ndarray, delta: float) -> np.ndarray:
+        _, q, r, start = np.split(local, np.cumsum([1, self._body.n_joint, self._body.n_joint]))
+        # Z grows like r and delta
+        speed = np.sqrt((r * r).sum(axis=0)) if self._relative else np.ones(q.shape[1])
+        r, start = r / speed, start / speed
+        if not np.isfinite(local[:-3]).all():
+            return np.full_like(start, np.nan)
+        if np.isnan(start).any() and self._last.size:
+            start = self._last
         solved = self._body.solve(
-            self._friction, angles, rates, at[-1], start=np.nan_to_num(start), tolerance=_TOLERANCE
+            self._friction, q, r, delta, start=np.nan_to_num(start), tolerance=_TOLERANCE
         )
         self.solves += 1
-        self._z = np.where(solved.residual < _ACCEPTED * _TOLERANCE, solved.z, np.nan)
-        return self._z
+        self._last = np.where(solved.residual < _ACCEPTED * _TOLERANCE, solved.z, np.nan)
+        return speed * self._last
 
 
 class FullProgram(Program):
@@ -361,13 +336,12 @@ class FullProgram(Program):
 
     def _function_of_body(self) -> None:
         layout, body, law = self.layout, self.dynamics.body, self.dynamics.law
-        self.velocity = BalancedVelocity(body, law, self.mesh.n_point)
+        self.velocity = BalancedVelocity(body, law, relative=self.relative)
         theta = layout.theta[:, self.sites]
         gather = np.concatenate([theta, layout.angles, layout.rates, layout.z])
         values = np.empty((0, self.mesh.n_point))
-        solve = partial(self.velocity.of_local, relative=self.relative)
         function = velocity_map(body, law, relative=self.relative)
-        self.point = self.add_repeated(Repeated(function, gather, values, solve))
+        self.point = self.add_repeated(Repeated(function, gather, values, self.velocity))
 
     def _at_points(self, formula: Any) -> np.ndarray:
         """Values at every point, ``(n_value, n_point)``."""

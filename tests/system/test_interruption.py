@@ -86,13 +86,13 @@ def test_ipopt_stops_between_iterations_and_says_nothing(capfd, monkeypatch):
     program, calls = program_of(problem), []
     x = program.feasible(problem.gait.parameters(problem.guess), 0.1)
 
-    def pressed(velocity_map, arguments, evaluated=BalancedVelocity.eval):
-        calls.append(arguments)
+    def pressed(velocity_map, local, delta, evaluated=BalancedVelocity.__call__):
+        calls.append(local)
         if len(calls) == 10:
             signal.raise_signal(signal.SIGINT)
-        return evaluated(velocity_map, arguments)
+        return evaluated(velocity_map, local, delta)
 
-    monkeypatch.setattr(BalancedVelocity, "eval", pressed)
+    monkeypatch.setattr(BalancedVelocity, "__call__", pressed)
     with pytest.raises(KeyboardInterrupt):
         Solver(program).solve_within(x, 0.1, None, np.inf)
     assert 10 <= len(calls) < 20
