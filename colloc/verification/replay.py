@@ -51,6 +51,10 @@ _KINK = 0.25
 parabola."""
 _BESIDE = 2
 """Instants by which panels are moved at most: half of a panel."""
+_SLACK = 0.05
+"""Of a panel, by which instants beside it may lie elsewhere."""
+_REACH = 0.5 + _SLACK
+"""Of a panel, within which the instants beside it lie."""
 _CORNER = 1e-6  # relative jump between neighbouring panels that is a corner or another branch
 
 
@@ -66,6 +70,7 @@ class Panels(NamedTuple):
     joint_power: np.ndarray  # (n, 5)
     apart: np.ndarray  # as of `followed_motion`, (n, 5, 3 + k)
     wider: np.ndarray  # `changes` of the panel that each is half of, (n, 3 + k)
+    differences: np.ndarray  # of `_find_differences`, NaN where there are none yet, as the rates
 
     def take(self, chosen: np.ndarray) -> Panels:
         return Panels(*(a[chosen] for a in self))
@@ -78,21 +83,23 @@ class Panels(NamedTuple):
         """Both halves of each, from values (z, rates, joint_power, apart) between the instants
         ``(n, 4)``, and what halving changed."""
         fields = []
-        for old, new in zip(self[2:-1], between, strict=True):
+        for old, new in zip(self[2:6], between, strict=True):
             merged = np.empty((len(old), 9, *old.shape[2:]), dtype=old.dtype)
             merged[:, ::2], merged[:, 1::2] = old, new
             both = np.stack([merged[:, :5], merged[:, 4:]], axis=1)
             fields.append(both.reshape(2 * len(old), *old.shape[1:]))
         left, width = np.repeat(self.left, 2), 0.5 * np.repeat(self.width, 2)
         left[1::2] += width[1::2]
-        return Panels(left, width, *[*fields, np.repeat(changed, 2, axis=0)])
+        wider, unknown = np.repeat(changed, 2, axis=0), np.full_like(fields[1], np.nan)
+        return Panels(left, width, *[*fields, wider, unknown])
 
 
 def first_panels(left: np.ndarray, width: np.ndarray, values: tuple[np.ndarray, ...]) -> Panels:
     """An even number of equal panels between any two corners."""
     paired = [np.concatenate([a[::2, ::2], a[1::2, 2::2]], axis=1) for a in values]
-    pairs = Panels(left[::2], 2 * width[::2], *[*paired, np.empty(0)])
-    return Panels(left, width, *[*values, np.repeat(changes(pairs)[0], 2, axis=0)])
+    unknown = np.full_like(values[1], np.nan)
+    pairs = Panels(left[::2], 2 * width[::2], *[*paired, np.empty(0), unknown[::2]])
+    return Panels(left, width, *[*values, np.repeat(changes(pairs)[0], 2, axis=0), unknown])
 
 
 def increments(panels: Panels, rule: np.ndarray = WHOLE) -> tuple[np.ndarray, ...]:
@@ -116,27 +123,42 @@ def changes(panels: Panels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     + k)``, and the largest if the panel lay up to one, and up to two instants beside;
     magnitudes."""
     heading, place = poses(*increments(panels)[:2])
-    rates, (index, seen) = np.moveaxis(panels.rates, -1, 0), _beside(panels)
-    more = rates[:, :, :4].reshape(len(rates), -1)[:, index]
-    extended = np.concatenate([more[..., :_BESIDE], rates, more[..., _BESIDE:]], axis=2)
-    inside = np.ones((panels.left.size, 5), dtype=bool)
-    known = np.concatenate([seen[:, :_BESIDE], inside, seen[:, _BESIDE:]], axis=1)
-    offsets = range(2 * _BESIDE + 1)
-    windows = np.stack([extended[..., k : k + 5] for k in offsets], axis=1)
-    there = np.stack([known[:, k : k + 5].all(axis=1) for k in offsets])
-    whole = _integrals(WHOLE, panels.width, windows)
-    once = _integrals(HALF, panels.width, windows[..., ::2])
-    turned, moved, *others = (a - b for a, b in zip(whole, once, strict=True))
+    _find_differences(panels)
+    turned, moved, *others = panels.differences.transpose(2, 1, 0)
     # what comes after the panel turns with it
     end = place[-1] - np.exp(1j * heading[:-1]) * moved - 1j * turned * (place[-1] - place[1:])
-    sizes = np.abs(np.stack([turned, abs(place[-1]) - np.abs(end), *others], axis=2))
-    sizes = sizes * there[..., None]
+    shorter = abs(place[-1]) - np.abs(end)
+    sizes = np.abs(np.stack([turned.real, shorter, *(each.real for each in others)], axis=2))
     return sizes[_BESIDE], sizes[1:-1].max(axis=0), sizes.max(axis=0)
 
 
-def _beside(panels: Panels) -> tuple[np.ndarray, np.ndarray]:
-    """Indices among all instants of the two before and after each panel, at its spacing ``(n, 4)``;
-    and whether there are such, with no corner between."""
+def _find_differences(panels: Panels) -> None:
+    """Write to new panels, and those within reach of one, what halving them changes of `increments`
+    if they lay from two instants earlier to two later; 0 where that is not known."""
+    (left, width), total = (
+        panels[:2],
+        np.append(0, np.cumsum(np.isnan(panels.differences[:, 0, 0]))),
+    )
+    ends = left - _REACH * width, left + (1 + _REACH) * width
+    first, last = (np.searchsorted(left, end % 1.0, side="right") - 1 for end in ends)
+    within = total[last + 1] - total[first] + total[-1] * (last < first)
+    found = np.flatnonzero(within)
+    rates, (index, seen) = np.moveaxis(panels.rates, -1, 0), _beside(panels, found)
+    more = rates[:, :, :4].reshape(len(rates), -1)[:, index]
+    extended = np.concatenate([more[..., :_BESIDE], rates[:, found], more[..., _BESIDE:]], axis=2)
+    known = np.insert(seen, [_BESIDE] * 5, True, axis=1)
+    offsets = range(2 * _BESIDE + 1)
+    windows = np.stack([extended[..., k : k + 5] for k in offsets], axis=1)
+    whole = _integrals(WHOLE, width[found], windows)
+    once = _integrals(HALF, width[found], windows[..., ::2])
+    there = np.stack([known[:, k : k + 5].all(axis=1) for k in offsets])
+    each = [(a - b) * there for a, b in zip(whole, once, strict=True)]
+    panels.differences[found] = np.transpose(each, (2, 1, 0))
+
+
+def _beside(panels: Panels, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Indices among all instants of the two before and after some panels, at their spacing ``(n,
+    4)``; and whether there are such, with no corner between."""
     left, width = panels.left[:, None], panels.width[:, None]
     instants = (left + 0.25 * width * np.arange(4)).ravel()
     state = np.concatenate([panels.z, panels.rates[:, :, 2:3].real], axis=2)
@@ -145,11 +167,12 @@ def _beside(panels: Panels) -> tuple[np.ndarray, np.ndarray]:
     stretch = np.concatenate([[0], np.cumsum(corners[:-1])])
     if not corners[-1]:
         stretch[stretch == stretch[-1]] = 0
+    left, width, at = left[chosen], width[chosen], stretch[chosen, None]
     wanted = left + 0.25 * width * np.array([*range(-_BESIDE, 0), *range(5, 5 + _BESIDE)])
-    slack = 0.05 * width
+    slack = _SLACK * width
     index = np.searchsorted(instants, wanted % 1.0 - slack) % instants.size
     off = np.abs(instants[index] - wanted % 1.0)
-    seen = (np.minimum(off, 1 - off) < slack) & (stretch[index // 4] == stretch[:, None])
+    seen = (np.minimum(off, 1 - off) < slack) & (stretch[index // 4] == at)
     return index, seen & ~(corners[-1] & ((wanted < -slack) | (wanted > 1 - slack)))
 
 

@@ -184,6 +184,21 @@ def test_corners_are_not_taken_for_kinks():
     assert stated_work(kept_in_view) > 1e-3
 
 
+def test_changes_that_are_kept_are_those_that_would_be_found_again():
+    def power(t):
+        return np.abs(np.sin(2 * np.pi * t) - 0.3)
+
+    panels = panels_of(power)
+    for chosen in ([3, 4], [4, 5], [6, 9], [0, 10], [21]):
+        changed, old = panelled.changes(panels)[0], panels.take(np.array(chosen))
+        middles = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
+        rest = panels.take(np.setdiff1d(np.arange(panels.left.size), chosen))
+        panels = rest.join(old.halves(at_rest(power(middles)), changed[chosen]))
+        again = panels._replace(differences=np.full_like(panels.rates, np.nan))
+        for known, found in zip(panelled.changes(panels), panelled.changes(again), strict=True):
+            np.testing.assert_allclose(known, found, rtol=1e-12, atol=1e-15)
+
+
 @pytest.mark.parametrize("steady", [False, True])
 def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
     """The rest of the path turns with the panel, all that changes where that is steady."""
@@ -192,7 +207,9 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
     centre[:] = centre[:, :1] if steady else centre
     rates = np.stack([spin, centre, *rng.uniform(1, 2, (3, n, 5))], axis=-1)
     values = rng.normal(size=(n, 5, 3)), rates, spin, np.zeros((n, 5, 5))
-    panels = panelled.Panels(np.arange(n) / n, np.full(n, 1 / n), *values, np.zeros((n, 5)))
+    panels = panelled.Panels(
+        np.arange(n) / n, np.full(n, 1 / n), *values, np.zeros((n, 5)), values[1] * np.nan
+    )
     once, twice = panelled.increments(panels, panelled.HALF), panelled.increments(panels)
 
     def distance(turn, move):
