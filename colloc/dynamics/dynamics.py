@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -207,8 +207,7 @@ class QuasiStatic:
         return float(static[-1]) if "theta" in self.states else 0.0
 
     def equations(self, mesh: Mesh, unit: float = 1.0) -> CollocatedStates:
-        free = np.array([name in STATES for name in self.states])
-        return CollocatedStates(mesh, free, momenta_image(self.symmetry), unit)
+        return _equations(mesh, self.states, self.symmetry, unit)
 
     @property
     def _grow(self) -> list[int]:
@@ -270,6 +269,12 @@ class QuasiStatic:
         rows[:, np.array(self._grow) - OMEGA] += on_rates.reshape(m, k, *weight.shape)
         on_more = np.einsum("mrt,rkt->mk", on_rates, on_states[self._grow, k:])
         return rows, np.concatenate([on_more, on_begin[:, turns]], axis=1), on_ends
+
+
+@lru_cache(maxsize=8)  # they know what is linear at the last states
+def _equations(mesh: Mesh, states: tuple[str, ...], symmetry: str, unit: float) -> CollocatedStates:
+    free = np.array([name in STATES for name in states])
+    return CollocatedStates(mesh, free, momenta_image(symmetry), unit)
 
 
 class OnSlope(QuasiStatic):

@@ -56,6 +56,7 @@ class CollocatedStates:
         self._a = unit * mesh.h[:, None, None] * mesh.scheme.A
         self._b = unit * mesh.h[:, None] * mesh.scheme.b
         self._free, self._image = free, np.eye(len(free)) if image is None else image
+        self._last: tuple[np.ndarray, _Linear] | None = None
 
     @property
     def scheme(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -195,7 +196,10 @@ class CollocatedStates:
         return self._linear(on_states).vjp(of_states)
 
     def _linear(self, on_states: np.ndarray) -> _Linear:
-        return _Linear(*self.scheme, self._free, on_states)
+        last = self._last
+        if last is None or not np.array_equal(last[0], on_states):
+            last = self._last = on_states.copy(), _Linear(*self.scheme, self._free, on_states)
+        return last[1]
 
 
 class _Linear:
