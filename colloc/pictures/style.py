@@ -30,6 +30,8 @@ _STYLE: Any = {
     "ytick.color": INK,
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # else every tick is laid out once more, to see that a title is free of it
+    "text.hinting": "none",  # a fifth quicker, and true to the font's spacing
     "legend.fontsize": 8,
     "legend.frameon": False,
     "axes.spines.top": False,
