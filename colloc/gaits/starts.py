@@ -56,9 +56,14 @@ _NEAR = 10.0
 
 
 def largest_factor(
-    body: Body, joint_limit: Limit, angles: np.ndarray, rest: np.ndarray | float = 0.0
+    body: Body,
+    joint_limit: Limit,
+    angles: np.ndarray,
+    rest: np.ndarray | float = 0.0,
+    least: float = 0.0,
 ) -> float:
-    """The largest factor that leaves shapes ``(n_joint, n)`` admissible; inf for straight ones."""
+    """The largest factor that leaves shapes ``(n_joint, n)`` admissible, 0 if it is below `least`;
+    inf for straight ones."""
     angles = angles - rest
     stretched, joint_limit = under_one_limit(angles, joint_limit)
     peak = body.bounded_angles.largest(stretched).max()
@@ -69,6 +74,8 @@ def largest_factor(
         return bool(crossing_depth(body, factor * angles + rest).any())
 
     low, high = 0.0, joint_limit / peak
+    if high * SAFE < least or (least > 0 and crosses(least / SAFE)):
+        return 0.0
     if not crosses(high):
         return high * SAFE
     for _ in range(_BISECTIONS):
@@ -177,10 +184,10 @@ def check_guess(
         raise ProblemError(f"guess is inadmissible: {what}; make its amplitude smaller.")
 
 
-def largest_amplitude(problem: Any, gait: Any) -> float:
+def largest_amplitude(problem: Any, gait: Any, least: float = 0.0) -> float:
     """`largest_factor` of a gait that keeps limits of speed, too."""
     angles = gait.angles(_EVENLY)
-    largest = largest_factor(problem.body, problem.joint_limit, angles, gait.rest)
+    largest = largest_factor(problem.body, problem.joint_limit, angles, gait.rest, least)
     share = largest_share(gait, problem.largest_speeds)
     return min(largest, 1 / share) if share else largest
 
@@ -215,8 +222,9 @@ def latin_hypercube_gait(problem: Any, seed: int, start: int) -> Any:
     again = np.random.default_rng([seed, block, row + 1])
     for _ in range(_ATTEMPTS + 1):
         fraction = _FRACTIONS[0] + unit[-1] * (_FRACTIONS[1] - _FRACTIONS[0])
-        gait = _with_amplitude(problem, seeds.sample(unit[:-1], n_joint), fraction)
-        if fastest is None or gait.shape_speed > fastest.shape_speed:
+        faster_than = 0.0 if fastest is None else fastest.shape_speed
+        gait = _with_amplitude(problem, seeds.sample(unit[:-1], n_joint), fraction, faster_than)
+        if gait.shape_speed > faster_than:
             fastest = gait
         if fastest.shape_speed > _CLEARLY_MOVING * least:
             return fastest
@@ -228,11 +236,12 @@ def latin_hypercube_gait(problem: Any, seed: int, start: int) -> Any:
     )
 
 
-def _with_amplitude(problem: Any, gait: Any, fraction: float) -> Any:
-    """The class member nearest to a gait, at a fraction of the largest admissible amplitude."""
+def _with_amplitude(problem: Any, gait: Any, fraction: float, faster_than: float = 0.0) -> Any:
+    """The class member nearest to a gait, at a fraction of the largest admissible amplitude; at
+    rest unless it is faster then."""
     seeds = problem.gait.start_class
     member = seeds.member(seeds.parameters(gait), problem.body.n_joint)
-    largest = largest_amplitude(problem, member)
+    largest = largest_amplitude(problem, member, faster_than / (fraction * member.shape_speed))
     return member.scaled(fraction * largest) if np.isfinite(largest) else member
 
 

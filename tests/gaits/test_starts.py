@@ -158,3 +158,12 @@ def test_a_hexagon_is_an_octagon_with_corners_on_its_sides():
     solution = solve(warm_start(problem, hexagon, Polygon(8, "bilateral"), intervals=80), 1)
     assert solution.status == "solved"
     assert solution.certificate.efficiency > 0.4015
+
+
+@pytest.mark.parametrize("least", [0.5, 0.99, 1.01, 3.0])
+def test_a_factor_below_the_least_asked_for_is_not_looked_for(least):
+    angles = np.random.default_rng(7).normal(size=(5, 1)) * np.sin(np.linspace(0, 6, 50))
+    largest = starts.largest_factor(Chain((1 / 6,) * 6), np.pi, angles)
+    stated = starts.largest_factor(Chain((1 / 6,) * 6), np.pi, angles, least=least * largest)
+    assert stated == (largest if least < 1 else 0.0)
+    assert largest < np.pi / np.abs(angles).max() - 1e-3  # links cross before that
