@@ -24,6 +24,7 @@ from colloc.pictures.style import (
     BLACK,
     BLUE,
     GREEN,
+    GREY,
     ORANGE,
     PURPLE,
     SKY,
@@ -36,10 +37,10 @@ from colloc.search.explore import first_optimum
 from colloc.search.solve import confirm_optimum
 from scripts.program import command_line
 
-_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
-_MARKERS = "osD^vPX"
+_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK, GREY)
+_MARKERS = "osD^vPX*"
 
-Series = Mapping[str, tuple[np.ndarray, np.ndarray]]
+Series = Mapping[str, tuple[np.ndarray, np.ndarray] | np.ndarray]
 """Name of a scheme to processor seconds and relative errors."""
 
 SECOND_ORDER = "trapezoid"
@@ -122,13 +123,15 @@ def save_work_precision(
     with figure_style():
         figure = Figure(figsize=(6.6, 4.4))
         axes = figure.subplots()
-        for index, scheme in enumerate(uniform):
+        for index, scheme in enumerate({**uniform, **refined}):
             style = {
                 "color": _COLOURS[index % len(_COLOURS)],
                 "marker": _MARKERS[index % len(_MARKERS)],
                 "ms": 5,
             }
-            axes.loglog(*uniform[scheme], ls=":", mfc="white", **style)
+            if scheme in uniform:
+                unless_refined = None if scheme in refined else scheme
+                axes.loglog(*uniform[scheme], ls=":", mfc="white", label=unless_refined, **style)
             if scheme in refined:
                 axes.loglog(*refined[scheme], ls="-", label=scheme, **style)
         axes.plot([], [], ":", color=BLACK, marker="o", mfc="white", label="uniform meshes")
@@ -136,8 +139,8 @@ def save_work_precision(
         axes.set(
             xlabel="processor time [s]", ylabel="relative error of the efficiency", title=title
         )
-        ticks = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50]
         low, high = axes.get_xlim()
+        ticks = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50] if high < 500 * low else [0.01, 0.1, 1, 10]
         axes.set_xticks(
             [t for t in ticks if low <= t <= high], [f"{t:g}" for t in ticks if low <= t <= high]
         )

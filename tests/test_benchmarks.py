@@ -30,6 +30,10 @@ def test_other_tools_are_given_the_same_physics(delta):
         now = instant(Chain(), Friction(), angles, speeds / (2 * np.pi), z[:, None], delta)
         np.testing.assert_allclose(balance, net_force(now.posture, now.force)[:, 0], atol=3e-6)
         assert rates[2] == pytest.approx(total_power(now.velocity, now.force).item(), rel=1e-5)
+        forces = physics.link_forces(t, z, own, delta)
+        lifted, same_rates = physics.balance_and_rates(np, t, theta, z, own, delta, forces)
+        np.testing.assert_allclose(lifted, [*balance, *np.zeros(9)], atol=1e-12)
+        np.testing.assert_allclose(same_rates, rates)
 
 
 def test_starts_are_admissible_and_their_motion_is_in_balance():

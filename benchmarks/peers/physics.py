@@ -7,6 +7,8 @@ the one of `mechanics.friction` without its case distinctions: 1 - q is lowered 
 0..pi, half a period; delta is per radian of phase.
 """
 
+import numpy as np
+
 LENGTH = 1 / 3
 GUESSES = 20
 DELTAS = [10 ** (-1 - 0.5 * k) for k in range(7)]
@@ -22,8 +24,8 @@ def gait(m, t, A0, A1, B1):
     return angles, rates
 
 
-def link_force(m, vs, vn, w, delta):
-    """Tangential and normal force and couple about the midpoint of a link."""
+def drag(m, vs, vn, w, delta):
+    """Drag over velocity: of a link along it, across it, and in rotation about its midpoint."""
     half = 0.5 * LENGTH * w
     a2 = vs**2 + delta**2
     y0, y1 = vn - half, vn + half
@@ -35,27 +37,32 @@ def link_force(m, vs, vn, w, delta):
     root = m.sqrt(q)
     g = 0.5 * m.log((1 + root) ** 2 / one_less_q) / root
     h = (g - 1) / q
-    return (
-        -2 * LENGTH * vs * g / S,
-        -2 * LENGTH * vn / S,
-        -w * LENGTH**3 / S * (0.5 * Q - a2 * h / S**2),
-    )
+    return 2 * LENGTH * g / S, 2 * LENGTH / S, LENGTH**3 / S * (0.5 * Q - a2 * h / S**2)
 
 
-def balance_and_rates(m, t, theta, z, parameters, delta):
-    """Force and torque balance (three values), and the rates of orientation, distance and work."""
+def balance_and_rates(m, t, theta, z, parameters, delta, forces=None):
+    """Force and torque balance (three values), and the rates of orientation, distance and work.
+
+    With lifted `forces` (along, across and couple of each link) the balance holds for those, and
+    has their law as nine rows more: force over drag, plus velocity, is zero."""
     u, v, omega = z
     (q1, q2), (p1, p2) = gait(m, t, *parameters)
     phi, w = (0.0 * q1, q1, q1 + q2), (omega, omega + p1, omega + p1 + p2)
     x = y = 0.0
     vx, vy = u, v
     fx = fy = torque = power = cx = cy = 0.0
+    law = []
     for k in range(3):
         c, s = m.cos(phi[k]), m.sin(phi[k])
         x, y = x + 0.5 * LENGTH * c, y + 0.5 * LENGTH * s
         vx, vy = vx - 0.5 * LENGTH * w[k] * s, vy + 0.5 * LENGTH * w[k] * c
         vs, vn = vx * c + vy * s, vy * c - vx * s
-        along, across, couple = link_force(m, vs, vn, w[k], delta)
+        velocity, ratios = (vs, vn, w[k]), drag(m, vs, vn, w[k], delta)
+        if forces is None:
+            along, across, couple = (-ratio * v for ratio, v in zip(ratios, velocity, strict=True))
+        else:
+            along, across, couple = own = forces[3 * k : 3 * k + 3]
+            law += [f / ratio + v for f, ratio, v in zip(own, ratios, velocity, strict=True)]
         px, py = along * c - across * s, along * s + across * c
         fx, fy, torque = fx + px, fy + py, torque + x * py - y * px + couple
         power = power - (along * vs + across * vn + couple * w[k])
@@ -63,4 +70,13 @@ def balance_and_rates(m, t, theta, z, parameters, delta):
         x, y = x + 0.5 * LENGTH * c, y + 0.5 * LENGTH * s
         vx, vy = vx - 0.5 * LENGTH * w[k] * s, vy + 0.5 * LENGTH * w[k] * c
     advance = m.cos(theta) * cx - m.sin(theta) * cy
-    return (fx, fy, torque), (omega, advance, power)
+    return (fx, fy, torque, *law), (omega, advance, power)
+
+
+def link_forces(t, z, parameters, delta):
+    """The forces that a motion has by their law, in which they are linear; NumPy."""
+    without, with_units = (
+        np.array(balance_and_rates(np, t, 0.0, z, parameters, delta, 9 * [size])[0][3:])
+        for size in (0.0, 1.0)
+    )
+    return -without / (with_units - without)

@@ -7,27 +7,24 @@ import argparse
 import json
 import os
 import sys
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from benchmarks.peers.settings import INTERVALS
 from benchmarks.peers.starts import starts
 
 
 def arguments(page: str, **flags: str) -> argparse.Namespace:
-    """The options of a tool's script: --starts, --first, --paced, and its own switches with their
-    help."""
+    """The options of a tool's script: --starts, --intervals, --paced, and its own switches with
+    their help."""
     parser = argparse.ArgumentParser(
         description=page, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--starts", type=int, default=20)
-    parser.add_argument(
-        "--first",
-        type=int,
-        default=0,
-        help="starts to leave out, of an earlier run that was cut short",
-    )
+    parser.add_argument("--intervals", type=int, default=INTERVALS, help="on half a period")
     parser.add_argument(
         "--paced", action="store_true", help="wait for a line on standard input before every start"
     )
@@ -39,23 +36,25 @@ def arguments(page: str, **flags: str) -> argparse.Namespace:
 def run(
     options: argparse.Namespace, build: Callable[[], Any], solve: Callable[[Any, np.ndarray], dict]
 ) -> None:
-    """Prints what `solve` makes of every start; the first one of all pays for `build`, and for the
-    processes it starts."""
-    program = build() if options.first else None
-    begin = _processor_seconds()
-    for start in starts(options.starts)[options.first :]:
+    """Prints what `solve` makes of every start; seconds of `build` stand apart. What solves several
+    starts `at_once` counts a share for each."""
+    program, built = None, 0.0
+    for start in starts(options.starts):
         if options.paced:
             sys.stdin.readline()
-        program = build() if program is None else program
+        begin = _processor_seconds()
+        if program is None:
+            program = build()
+            begin, built = _processor_seconds(), _processor_seconds() - begin
         result = solve(program, start)
-        now = _processor_seconds()
-        print(json.dumps(result | {"cpu": now - begin, "start": start.tolist()}), flush=True)
-        begin = now
+        spent = (_processor_seconds() - begin) / result.get("at_once", 1)
+        result |= {"cpu": spent, "build": built, "intervals": options.intervals}
+        print(json.dumps(result | {"start": start.tolist()}), flush=True)
 
 
 def _processor_seconds() -> float:
     """Of this process and of its children that have ended (a compiler)."""
-    return sum(os.times()[:4])
+    return time.process_time() + sum(os.times()[2:4])
 
 
 def words_of(error: Exception) -> str:

@@ -12,31 +12,30 @@ from scipy.optimize import minimize
 
 from benchmarks.peers.physics import DELTAS
 from benchmarks.peers.runs import arguments, failed, found, run
-from benchmarks.peers.settings import INTERVALS
 from colloc import Harmonic, Problem, ellipse
 from colloc.reduced.program import ReducedProgram
 from colloc.search.iterate import space_near
 from colloc.transcription.layout import RADIANS
 
 TOLERANCE = 1e-9
-STATED = Problem(
-    "peer",
-    ellipse(0.3, 1.0, 0.5),
-    gait=Harmonic(1, "bilateral"),
-    intervals=INTERVALS,
-    scheme="radau-3",
-    mesh_tolerance=0,
-)
 
 
 class Reduced:
     """Minus the efficiency of a gait and its gradient, and the joint limits at the mesh's
     points."""
 
-    def __init__(self) -> None:
-        space, _ = space_near(STATED, STATED.guess)
+    def __init__(self, intervals: int) -> None:
+        stated = Problem(
+            "peer",
+            ellipse(0.3, 1.0, 0.5),
+            gait=Harmonic(1, "bilateral"),
+            intervals=intervals,
+            scheme="radau-3",
+            mesh_tolerance=0,
+        )
+        space, _ = space_near(stated, stated.guess)
         self.program = ReducedProgram(space, DELTAS[0] / RADIANS)
-        angles = STATED.gait.angle_matrix(space.mesh.times, 2).reshape(-1, 3)
+        angles = stated.gait.angle_matrix(space.mesh.times, 2).reshape(-1, 3)
         both = np.vstack([angles, -angles])
         self.limits = {"type": "ineq", "fun": lambda v: np.pi - both @ v, "jac": lambda v: -both}
 
@@ -67,4 +66,5 @@ def solve(reduced: Reduced, start: np.ndarray) -> dict:
 
 
 if __name__ == "__main__":
-    run(arguments(__doc__), Reduced, solve)
+    chosen = arguments(__doc__)
+    run(chosen, lambda: Reduced(chosen.intervals), solve)

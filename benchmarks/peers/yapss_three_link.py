@@ -1,7 +1,7 @@
 """The three-link problem in YAPSS, after its examples isoperimetric.py (closed curves) and
 newton.py (parameters).
 
-Run in the peers' environment: python -m benchmarks.peers.yapss_three_link --starts 20 [--tuned]
+Run in the peers' environment: python -m benchmarks.peers.yapss_three_link --starts 20
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import yapss.math
 
 from benchmarks.peers.physics import DELTAS, balance_and_rates, gait
 from benchmarks.peers.runs import arguments, failed, found, run
-from benchmarks.peers.settings import DEFAULT, DEGREE, INTERVALS, TUNED
+from benchmarks.peers.settings import DEGREE, OPTIONS
 from benchmarks.peers.starts import feasible_motion
 
 
-def build(delta: float, own: np.ndarray, tuned: bool) -> yapss.Problem:
+def build(delta: float, own: np.ndarray, intervals: int) -> yapss.Problem:
     """The problem at one delta with a feasible guess."""
     ocp = yapss.Problem(name="three links", nx=[3], nu=[3], nh=[5], ns=3)
 
@@ -42,25 +42,25 @@ def build(delta: float, own: np.ndarray, tuned: bool) -> yapss.Problem:
     bounds.initial_state.lower[1:] = bounds.initial_state.upper[1:] = 0.0
     bounds.path.lower[:] = [0, 0, 0, -np.pi, -np.pi]
     bounds.path.upper[:] = [0, 0, 0, np.pi, np.pi]
-    phases = np.linspace(0, np.pi, 8 * INTERVALS + 1)
+    phases = np.linspace(0, np.pi, 8 * intervals + 1)
     guess.time = phases
     guess.state, guess.control = feasible_motion(own, delta, phases)
     ocp.guess.parameter = own
-    ocp.mesh.phase[0].collocation_points = INTERVALS * (DEGREE,)
-    ocp.mesh.phase[0].fraction = INTERVALS * (1 / INTERVALS,)
+    ocp.mesh.phase[0].collocation_points = intervals * (DEGREE,)
+    ocp.mesh.phase[0].fraction = intervals * (1 / intervals,)
     ocp.spectral_method = "lgr"
     ocp.derivatives.method, ocp.derivatives.order = "auto", "second"
-    for name, value in {**DEFAULT, **(TUNED if tuned else {})}.items():
+    for name, value in OPTIONS.items():
         setattr(ocp.ipopt_options, name, value)
     return ocp
 
 
-def solve(tuned: bool, start: np.ndarray) -> dict:
+def solve(intervals: int, start: np.ndarray) -> dict:
     """Continuation in delta from one start; the gait and efficiency of the last level, or where it
     failed."""
     own = start
     for level in DELTAS:
-        solution = build(level / (2 * np.pi), own, tuned).solve()
+        solution = build(level / (2 * np.pi), own, intervals).solve()
         if solution.nlp_info.ipopt_status != 0:
             return failed(level, solution.nlp_info.ipopt_status_message)
         own = np.array(solution.parameter)
@@ -69,6 +69,6 @@ def solve(tuned: bool, start: np.ndarray) -> dict:
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    chosen = arguments(__doc__, tuned="options under which it converges from most starts")
+    chosen = arguments(__doc__)
     # a problem is written anew at every level: delta is a number in it
-    run(chosen, lambda: chosen.tuned, solve)
+    run(chosen, lambda: chosen.intervals, solve)
