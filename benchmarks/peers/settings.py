@@ -18,5 +18,6 @@ OPTIONS = {
     "alpha_for_y": "full",
     "max_iter": 300,
 }
-"""The time limit is per level of the continuation. From `mu_strategy` on, found by trial: with IPOPT's
-own settings 0 of 5 starts end in rockit and 3 of 20 in YAPSS (commit f6308821)."""
+"""The time limit is per level of the continuation. From `mu_strategy` on, found by trial on 24
+intervals: with IPOPT's own settings 0 of 5 starts end in rockit and 3 of 20 in YAPSS (commit
+f6308821). On 12, YAPSS ends with those of that commit, not with these."""
