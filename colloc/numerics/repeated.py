@@ -21,6 +21,12 @@ from colloc.numerics.sqp import keep_last
 _REGULARISATION = 1e-10  # makes a matrix of multipliers regular where equations are redundant
 
 
+Derived = tuple[ca.Function, ca.Function, ca.Function, ca.Sparsity, ca.Sparsity]
+"""Outputs, nonzeros of their Jacobian, those of the upper triangle of the Hessian of their sum with
+weights; the patterns of these."""
+_VALUES, _SLOPES, _CURVATURES = range(3)
+
+
 @dataclass(frozen=True, eq=False)
 class LocalFunction:
     """A function `out` of `local` variables, `given` numbers and `delta`, all columns; and of what
@@ -41,20 +47,9 @@ class LocalFunction:
         return _derived(ca.Function("local", inputs, outputs).serialize())
 
 
-class Derived(NamedTuple):
-    """Outputs, nonzeros of their Jacobian, those of the upper triangle of the Hessian of their sum
-    with weights; the patterns of these."""
-
-    value: ca.Function
-    slopes: ca.Function
-    curvatures: ca.Function
-    jacobian: ca.Sparsity
-    upper: ca.Sparsity
-
-
 @lru_cache(maxsize=64)
 def _derived(serialized: str) -> Derived:
-    """Of the function of a `LocalFunction`: programs of one kind share them."""
+    """Of the function of a `LocalFunction`; programs of one kind share them."""
     function = ca.Function.deserialize(serialized)
     symbols = function.sx_in()
     (local, *_), outputs = symbols, function.call(symbols)
@@ -77,7 +72,7 @@ def _derived(serialized: str) -> Derived:
         jacobian += by_row @ slope
     jacobian, upper = ca.sparsify(jacobian), ca.sparsify(ca.triu(hessian))
     nonzeros = [ca.densify(ca.vertcat(*part.nonzeros())) for part in (jacobian, upper)]
-    return Derived(
+    return (
         ca.Function("local", symbols, [ca.densify(out)]),
         ca.Function("jacobian", symbols, nonzeros[:1]),
         ca.Function("hessian", [*symbols, weight], nonzeros[1:]),
@@ -110,9 +105,9 @@ class NumPyFunction(ca.Callback):
     """A function as CasADi calls it, whose outputs are functions by NumPy, of dense columns to
     nonzeros. CasADi does not keep it alive."""
 
-    def __init__(self, name: str, inputs: dict[str, int], outputs: dict[str, Output]) -> None:
+    def __init__(self, name: str, inputs: Sequence[int], *outputs: Output) -> None:
         ca.Callback.__init__(self)
-        self._inputs, self._outputs = list(inputs.items()), list(outputs.items())
+        self._inputs, self._outputs = inputs, outputs
         self.construct(name)
 
     def get_n_in(self) -> int:
@@ -121,24 +116,18 @@ class NumPyFunction(ca.Callback):
     def get_n_out(self) -> int:
         return len(self._outputs)
 
-    def get_name_in(self, index: int) -> str:
-        return self._inputs[index][0]
-
-    def get_name_out(self, index: int) -> str:
-        return self._outputs[index][0]
-
     def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(self._inputs[index][1])
+        return ca.Sparsity.dense(self._inputs[index])
 
     def get_sparsity_out(self, index: int) -> ca.Sparsity:
-        return self._outputs[index][1][0]
+        return self._outputs[index][0]
 
     def has_eval_buffer(self) -> bool:
         return True
 
     def eval_buffer(self, inputs: Sequence[Any], outputs: Sequence[Any]) -> int:
         columns = [np.frombuffer(each) for each in inputs if each is not None]
-        for room, (_, (_, function)) in zip(outputs, self._outputs, strict=True):
+        for room, (_, function) in zip(outputs, self._outputs, strict=True):
             if room is not None:
                 np.frombuffer(room)[:] = function(*columns)
         return 0
@@ -175,29 +164,23 @@ class Nlp:
         column = np.concatenate([column[number], linear.col])
         factor = np.concatenate([on_y.data[at], linear.data])
         number = np.concatenate([number, np.full(linear.nnz, outs.size)])
-        in_f, size = row == 0, (n, outs.size + 1)
-        entries, in_g = (factor[in_f], (column[in_f], number[in_f])), ~in_f
-        self._gradient = sparse.csr_matrix(entries, shape=size)
-        places_of_g = row[in_g] - 1, column[in_g]
-        in_jacobian = _sums((m, n), size[1], factor[in_g], places_of_g, number[in_g])
-        self._jacobian, self._on_slopes = in_jacobian
+        shape, places_of_all = every[:, :n].shape, (row, column)
+        self._whole, self._on_slopes = _sums(shape, outs.size + 1, factor, places_of_all, number)
         row, column, factor = map(np.concatenate, zip(*places, strict=True))
         every_number = np.arange(row.size)
         hessian, self._on_curvatures = _sums((n, n), row.size, factor, (row, column), every_number)
         self._columns = keep_last(self._columns_at)
         self.values, self.slopes = keep_last(self._values_at), keep_last(self._slopes_at)
 
-        at, dense, join = {"x": n, "p": 1}, ca.Sparsity.dense, np.concatenate
-        f = {"f": (dense(1), lambda *at: self.values(join(at))[:1])}
-        g = {"g": (dense(m), lambda *at: self.values(join(at))[1:])}
-        grad_f = {"grad_f_x": (dense(n), lambda *at: self.slopes(join(at))[0])}
-        pattern = _pattern(self._jacobian)
-        jac_g = {"jac_g_x": (pattern, lambda *at: self.slopes(join(at))[1].data)}
-        hess_lag = {"triu_hess_gamma_x_x": (_pattern(hessian), self._hess_lag)}
+        at, dense, join = (n, 1), ca.Sparsity.dense, np.concatenate
+        f = dense(1), lambda *at: self.values(join(at))[:1]
+        g = dense(m), lambda *at: self.values(join(at))[1:]
+        gradient = dense(n), lambda *at: self.slopes(join(at))[0]
+        jacobian = _pattern(self._whole[1:]), lambda *at: self.slopes(join(at))[1].data
         self.functions = {
-            "grad_f": NumPyFunction("grad_f", at, f | grad_f),
-            "jac_g": NumPyFunction("jac_g", at, g | jac_g),
-            "hess_lag": NumPyFunction("hess_lag", at | {"lam_f": 1, "lam_g": m}, hess_lag),
+            "grad_f": NumPyFunction("grad_f", at, f, gradient),
+            "jac_g": NumPyFunction("jac_g", at, g, jacobian),
+            "hess_lag": NumPyFunction("hess_lag", (*at, 1, m), (_pattern(hessian), self._hess_lag)),
         }
         x, p = ca.MX.sym("x", n), ca.MX.sym("p")
         f_and_g = {name[-1]: self.functions[name](x, p)[0] for name in ("grad_f", "jac_g")}
@@ -206,21 +189,21 @@ class Nlp:
     def _columns_at(self, at: np.ndarray) -> list[list[np.ndarray]]:
         return [each.columns(at[:-1], float(at[-1])) for each in self._repeated]
 
-    def _of_instances(self, kind: str, columns: list[list[np.ndarray]]) -> list[np.ndarray]:
-        functions = (getattr(each.function.functions, kind) for each in self._repeated)
+    def _of_instances(self, kind: int, columns: list[list[np.ndarray]]) -> list[np.ndarray]:
+        functions = (each.function.functions[kind] for each in self._repeated)
         return [_at_instances(*both) for both in zip(functions, columns, strict=True)]
 
     def _values_at(self, at: np.ndarray) -> np.ndarray:
         """Objective and rows, ``(1 + m,)``, at ``(x, delta)``."""
-        outputs = self._of_instances("value", self._columns(at))
+        outputs = self._of_instances(_VALUES, self._columns(at))
         return np.asarray(self._every @ np.concatenate([at[:-1], *outputs, [1.0]]))
 
     def _slopes_at(self, at: np.ndarray) -> tuple[np.ndarray, sparse.csc_matrix]:
         """Gradient of the objective ``(n,)`` and Jacobian of the rows ``(m, n)``."""
-        slopes = np.concatenate([*self._of_instances("slopes", self._columns(at)), [1.0]])
-        known = self._jacobian
-        parts = self._on_slopes @ slopes, known.indices, known.indptr
-        return self._gradient @ slopes, sparse.csc_matrix(parts, shape=known.shape)
+        slopes = np.concatenate([*self._of_instances(_SLOPES, self._columns(at)), [1.0]])
+        parts = self._on_slopes @ slopes, self._whole.indices, self._whole.indptr
+        whole = sparse.csc_matrix(parts, shape=self._whole.shape)
+        return whole[:1].toarray().ravel(), whole[1:]
 
     def _hess_lag(
         self, x: np.ndarray, delta: np.ndarray, on_f: np.ndarray, on_g: np.ndarray
@@ -231,7 +214,7 @@ class Nlp:
             end = start + shape[0] * shape[1]
             columns.append([*given, weights[start:end].reshape(shape).T])
             start = end
-        curvatures = self._of_instances("curvatures", columns)
+        curvatures = self._of_instances(_CURVATURES, columns)
         return np.asarray(self._on_curvatures @ np.concatenate(curvatures))
 
 

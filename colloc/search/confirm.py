@@ -98,9 +98,10 @@ class Solver:
         self._settings: dict[str, object] = {f"ipopt.{k}": v for k, v in chosen.items()}
         off = ("print_time", "calc_lam_p", "calc_lam_x", "calc_f", "calc_g", "error_on_fail")
         self._settings |= dict.fromkeys(off, False) | {"no_nlp_grad": True}
-        sizes = {x: self._nlp.expressions[x.removeprefix("lam_")].numel() for x in ca.nlpsol_out()}
-        ends = {"stop": (ca.Sparsity.dense(1), lambda *_: is_interrupted())}
-        self._stop = NumPyFunction("stop_request", sizes, ends)  # held here, as CasADi does not
+        names = (name.removeprefix("lam_") for name in ca.nlpsol_out())
+        sizes = [self._nlp.expressions[name].numel() for name in names]
+        stop = ca.Sparsity.dense(1), lambda *_: is_interrupted()
+        self._stop = NumPyFunction("stop_request", sizes, stop)  # held here, as CasADi does not
         self._settings |= {**self._nlp.functions, "iteration_callback": self._stop}
 
     @cached_property
