@@ -111,7 +111,7 @@ def first_optimum(problem: Problem, gait: AnyGait) -> Iterate:
 
 def explore(problem: Problem, starts: int | None = None) -> Exploration:
     """The best gaits of a problem's class that so many starts, and at most three times as many,
-    lead to: by default 32, with inertia 96, or fewer once some of them have met the best gait.
+    lead to: by default 32, with inertia 96, or fewer then once some of them have met the best one.
 
     Where they shrink until nobody sees them move, the search begins anew among gaits at least as
     large as the best optimum of finite size; without one, as large as the default guess is, or as
@@ -265,7 +265,9 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
     def is_finished() -> bool:
         n_met = min(last, key=_DRY).n_new if last else 0
         sure = n_met >= max(OPTIONS.patience / 2, n_new / OPTIONS.patience)
-        enough = tried >= count or (sure and not starts and 4 * tried >= count)
+        # where a start takes long; elsewhere gaits that few starts meet are worth all of them
+        may_end_early = problem.regime.froude and not starts
+        enough = tried >= count or (sure and may_end_early and 4 * tried >= count)
         if enough and tried > improved + OPTIONS.patience:
             return True
         # joints so weak that no gait keeps their limits, as it seems

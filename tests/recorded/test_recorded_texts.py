@@ -42,7 +42,8 @@ PRECISION, FACTOR, ROUNDING, OF_MACHINE = 2e-4, 3.0, 1e-6, 1e-12
 MACHINE = {
     r"in \d+\.\d s\b": "in ... s",
     r"\d+ (time points|iterations)": r"... \1",
-    r"best of 8 starts; \d+ converged": "best of 8 starts; ... converged",
+    r"best of 32 starts; \d+ converged": "best of 32 starts; ... converged",
+    r"\(\d+ starts?\)": "(... starts)",
     r"\(\d+ kB": "(... kB",
     r"[0-9a-f]{64}": "...",
     r"(?m)^(python|colloc|casadi|numpy|scipy|h5py)\n\d\S*$": r"\1 ...",

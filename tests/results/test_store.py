@@ -196,7 +196,7 @@ def test_a_better_answer_to_the_same_question_is_kept_no_worse_or_equal_one(thre
         assert saved.former == (former and tmp_path / "x.former-1.h5")
         assert load(path).certificate.value == value
     assert values(tmp_path) == {"x.h5": 0.1, "x.former-1.h5": 0.3}
-    assert "which is better (0.3, best of 8 starts)" in saved.why
+    assert "which is better (0.3, best of 32 starts)" in saved.why
 
 
 @pytest.mark.skipif(
