@@ -29,6 +29,9 @@ _COUNTS = (
     "n_moving", "n_shape", "n_side", "antipodal", "iterations",
 )  # fmt: skip
 _QUANTITIES = "distance", "work", "rotation"
+_MOST_ROWS = 500
+"""Quadratic programs with more take most of the time, and DAQP gives up sooner where their rows
+contradict each other: twenty links from one start took 250 s without it."""
 
 
 class _Search(ctypes.Structure):
@@ -89,6 +92,8 @@ def _minimize(
     formulas = [each.operations(_QUANTITIES) for each in program.formulas]
     listed = [each for each in formulas if each is not None]
     if not v.size or program.actuators or kernel_rows is None or len(listed) < len(formulas):
+        return None
+    if kernel_rows["which"].size > _MOST_ROWS:
         return None
     start = motion.at(v, delta)
     of_motion = motion.kernel_fields(start)
