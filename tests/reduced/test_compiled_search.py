@@ -27,7 +27,9 @@ def program_of(problem, follow=False):
     space, v = space_near(problem, gait)
     program = ReducedProgram(space, _DELTA)
     program.place_rows(v)
-    if follow:
+    if follow:  # at an optimum with the instants fixed, whose rows bind
+        v = sqp.minimize(program, v, 0.4, 1e-9, 60).v
+        program.place_rows(v)
         program.follow_worst()
     return program, v
 
@@ -56,6 +58,7 @@ CASES = {
     "antipodal": {"body": _FOUR, "friction": _ANISOTROPIC, "gait": Harmonic(3, "antipodal")},
     "five links": {"body": _FIVE, "joint_limit": 1.2},
     "turning": {"rotation": 0.3},
+    "turning far": {"rotation": 0.3, "at_least": {"distance": 0.1}},
     "spline": {"gait": BSpline(8, symmetry="antipodal")},
     "polygon": {"body": _FOUR, "gait": Polygon(6, "antipodal")},
     "feet": {"body": Chain(feet=1), "friction": _ANISOTROPIC},
@@ -63,6 +66,9 @@ CASES = {
     "required values": {"at_least": {"distance": 0.1, "distance**2/work": 0.01}},
     "own objective": {"objective": "2 - work / distance - -distance ** 2 * 3"},
     "limited speeds": {"body": _FOUR, "speed_limit": (5.0, 6.0, 7.0), "joint_limit": 1.5},
+    "two harmonics": {"body": _FIVE, "gait": Harmonic(2), "joint_limit": 0.8},
+    "slow": {"objective": "2 - work", "smallest_shape_speed": 1.2},
+    "slow polygon": {"objective": "2 - work", "smallest_shape_speed": 1.2, "gait": Polygon(6)},
 }
 
 
@@ -80,6 +86,17 @@ def test_it_ends_where_numpy_does_after_as_many_steps(case, follow):
     np.testing.assert_allclose(ours.curvature, reference.curvature, rtol=1e-3, atol=1e-3)
 
 
+def test_bounds_of_parameters_are_kept_and_are_no_edge_of_the_box():
+    ends = []
+    for minimize in (compiled_search.minimize, sqp.minimize):
+        program, v = program_of(Problem("x", gait=Harmonic(1)))
+        program.lower, program.upper = v - 0.01, v + 0.02
+        ends.append(minimize(program, v, 0.4, 1e-9))
+        assert not ends[-1].on_edge
+    np.testing.assert_allclose(ends[0].v, ends[1].v, atol=1e-9)
+    assert (np.isclose(ends[0].v, v - 0.01) | np.isclose(ends[0].v, v + 0.02)).any()
+
+
 def test_known_curvature_is_taken_and_left_as_it_was():
     problem = Problem("x", gait=Harmonic(2, "none"))
     program, v = program_of(problem)
@@ -91,12 +108,14 @@ def test_known_curvature_is_taken_and_left_as_it_was():
     np.testing.assert_array_equal(known, before)
 
 
-def test_of_rows_that_contradict_each_other_the_same_part_is_removed():
-    problem = Problem("x", gait=Harmonic(1, "none"), at_least={"distance": 2.0}, joint_limit=1.0)
+@pytest.mark.parametrize(("distance", "rotation"), [(2.0, 0.0), (0.25, 0.5)])
+def test_of_rows_that_contradict_each_other_the_same_part_is_removed(distance, rotation):
+    asked = {"at_least": {"distance": distance}, "rotation": rotation, "joint_limit": 1.0}
+    problem = Problem("x", gait=Harmonic(1), **asked)
     ours, reference = both(problem)
     np.testing.assert_allclose(ours.v, reference.v, atol=1e-5)
     program, _ = program_of(problem)
-    assert sqp.stationarity(program, ours.v).violation > 0.5
+    assert sqp.stationarity(program, ours.v).violation > 0.1
 
 
 def test_the_nearest_gait_keeps_its_area_and_the_rows(monkeypatch):
