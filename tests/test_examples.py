@@ -69,8 +69,6 @@ SLOW = 1.3
 """Files that took longer [s of processor time], or whose time is not known, are left to the slow
 tests."""
 SCRIPTS = {file.stem for file in FILES if "__main__" in file.read_text(encoding="utf-8")}
-CLOSE_OPTIMA = {"three_link_spline"}
-"""Classes so rich that rounding chooses between optima: 0.41348 and 0.41368 on four processors."""
 
 
 def cases():
@@ -95,8 +93,6 @@ def test_the_problem_file_does_what_it_says(file, solved, tmp_path, monkeypatch,
         assert row["efficiency"] == pytest.approx(reference.efficiency, abs=reference.tolerance)
     before = NUMBERS[file.stem]
     allowed = 3e-5 + 3 * (before["error"] + row["error"])
-    if file.stem in CLOSE_OPTIMA:
-        allowed = reference.tolerance
     assert row["efficiency"] == pytest.approx(before["efficiency"], abs=allowed)
     if file.stem in SCRIPTS:
         with Image.open(f"{file.stem}.gif") as film:
