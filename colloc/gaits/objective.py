@@ -125,6 +125,7 @@ class Objective:
 
     @property
     def formula(self) -> Formula:
+        """The expression, parsed."""
         return formula(self.expression, self._names)
 
     @property

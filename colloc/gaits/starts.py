@@ -224,7 +224,7 @@ def latin_hypercube_gait(problem: Any, seed: int, start: int) -> Any:
         fraction = _FRACTIONS[0] + unit[-1] * (_FRACTIONS[1] - _FRACTIONS[0])
         faster_than = 0.0 if fastest is None else fastest.shape_speed
         gait = _with_amplitude(problem, seeds.sample(unit[:-1], n_joint), fraction, faster_than)
-        if gait.shape_speed > faster_than:
+        if fastest is None or gait.shape_speed > faster_than:
             fastest = gait
         if fastest.shape_speed > _CLEARLY_MOVING * least:
             return fastest
@@ -241,7 +241,8 @@ def _with_amplitude(problem: Any, gait: Any, fraction: float, faster_than: float
     rest unless it is faster then."""
     seeds = problem.gait.start_class
     member = seeds.member(seeds.parameters(gait), problem.body.n_joint)
-    largest = largest_amplitude(problem, member, faster_than / (fraction * member.shape_speed))
+    speed = fraction * member.shape_speed
+    largest = largest_amplitude(problem, member, faster_than / speed if speed else 0.0)
     return member.scaled(fraction * largest) if np.isfinite(largest) else member
 
 

@@ -27,7 +27,9 @@ _NODES = (
 )  # fmt: skip
 
 
-_ARITHMETIC = ast.Add, ast.Sub, ast.Mult, ast.Div
+_CONSTANT, _VARIABLE, _NEGATIVE, _PLUS, _MINUS, _TIMES, _OVER, _POWER = map(float, range(8))
+"""Operations of the kernel, as native/sqp.h numbers them."""
+_ARITHMETIC = {ast.Add: _PLUS, ast.Sub: _MINUS, ast.Mult: _TIMES, ast.Div: _OVER}
 _RULES: dict[type[ast.operator] | str, str] = {
     ast.Add: "da + db",
     ast.Sub: "da - db",
@@ -103,25 +105,28 @@ class Formula:
         """For the compiled kernel (native/sqp.h): how many operations there are, then each with its
         number, operands first. None for a formula with a function or with other variables."""
         steps: list[float] = []
-        listed = _list(self.tree.body, variables, steps)
+        listed = _append_operations(self.tree.body, variables, steps)
         few = len(steps) <= 2 * _MOST_OPERATIONS
         return np.array([len(steps) / 2, *steps]) if listed and few else None
 
 
-def _list(node: ast.expr, variables: Sequence[str], steps: list[float]) -> bool:
+def _append_operations(node: ast.expr, variables: Sequence[str], steps: list[float]) -> bool:
     match node:
         case ast.Constant(float(value)):
-            steps += 0.0, value
+            steps += _CONSTANT, value
         case ast.Name(name) if name in variables:
-            steps += 1.0, float(variables.index(name))
-        case ast.UnaryOp(ast.USub(), operand) if _list(operand, variables, steps):
-            steps += 2.0, 0.0
-        case ast.BinOp(base, ast.Pow(), exponent) if _list(base, variables, steps):
-            steps += 7.0, float(_evaluate(_compile(exponent), {}))
+            steps += _VARIABLE, float(variables.index(name))
+        case ast.UnaryOp(ast.USub(), operand) if _append_operations(operand, variables, steps):
+            steps += _NEGATIVE, 0.0
+        case ast.BinOp(base, ast.Pow(), exponent) if _append_operations(base, variables, steps):
+            steps += _POWER, float(_evaluate(_compile(exponent), {}))
         case ast.BinOp(left, operator, right) if type(operator) in _ARITHMETIC:
-            if not (_list(left, variables, steps) and _list(right, variables, steps)):
+            if not (
+                _append_operations(left, variables, steps)
+                and _append_operations(right, variables, steps)
+            ):
                 return False
-            steps += float(3 + _ARITHMETIC.index(type(operator))), 0.0
+            steps += _ARITHMETIC[type(operator)], 0.0
         case _:
             return False
     return True

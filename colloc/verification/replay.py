@@ -142,18 +142,18 @@ def _find_differences(panels: Panels) -> None:
     ends = left - _REACH * width, left + (1 + _REACH) * width
     first, last = (np.searchsorted(left, end % 1.0, side="right") - 1 for end in ends)
     within = total[last + 1] - total[first] + total[-1] * (last < first)
-    found = np.flatnonzero(within)
-    rates, (index, seen) = np.moveaxis(panels.rates, -1, 0), _beside(panels, found)
+    some = np.flatnonzero(within)
+    rates, (index, seen) = np.moveaxis(panels.rates, -1, 0), _beside(panels, some)
     more = rates[:, :, :4].reshape(len(rates), -1)[:, index]
-    extended = np.concatenate([more[..., :_BESIDE], rates[:, found], more[..., _BESIDE:]], axis=2)
+    extended = np.concatenate([more[..., :_BESIDE], rates[:, some], more[..., _BESIDE:]], axis=2)
     known = np.insert(seen, [_BESIDE] * 5, True, axis=1)
     offsets = range(2 * _BESIDE + 1)
     windows = np.stack([extended[..., k : k + 5] for k in offsets], axis=1)
-    whole = _integrals(WHOLE, width[found], windows)
-    once = _integrals(HALF, width[found], windows[..., ::2])
+    whole = _integrals(WHOLE, width[some], windows)
+    once = _integrals(HALF, width[some], windows[..., ::2])
     there = np.stack([known[:, k : k + 5].all(axis=1) for k in offsets])
     each = [(a - b) * there for a, b in zip(whole, once, strict=True)]
-    panels.differences[found] = np.transpose(each, (2, 1, 0))
+    panels.differences[some] = np.transpose(each, (2, 1, 0))
 
 
 def _beside(panels: Panels, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -167,3 +167,15 @@ def test_a_factor_below_the_least_asked_for_is_not_looked_for(least):
     stated = starts.largest_factor(Chain((1 / 6,) * 6), np.pi, angles, least=least * largest)
     assert stated == (largest if least < 1 else 0.0)
     assert largest < np.pi / np.abs(angles).max() - 1e-3  # links cross before that
+
+
+def test_a_random_gait_at_rest_is_followed_by_another(monkeypatch):
+    drawn, sample = [], Harmonic.sample
+
+    def at_rest_first(self, unit, n_joint):
+        drawn.append(unit)
+        return sample(self, unit, n_joint).scaled(float(len(drawn) > 2))
+
+    monkeypatch.setattr(Harmonic, "sample", at_rest_first)
+    assert latin_hypercube_gait(Problem("x", gait=Harmonic(1)), 0, 0).shape_speed > 0.1
+    assert len(drawn) >= 3

@@ -147,12 +147,15 @@ def test_a_period_has_the_same_bits_with_any_number_of_lanes(fresh, lengths):
 
 WITHIN_ITS_ARRAYS = """
 import numpy as np
-from colloc import Chain, Friction, solve_balance
+from colloc import Chain, Friction, Harmonic, Polygon, Problem, solve_balance
 from colloc.mechanics import native_kernel
 from colloc.mechanics.contact import far_pairs
 from colloc.mechanics.fixed_point import motion_and_derivatives
 from colloc.mechanics.solution_branches import all_balanced_velocities
 from colloc.transcription.shape_constraints import shape_checks
+from colloc.reduced import compiled_search
+from colloc.reduced.program import ReducedProgram
+from colloc.search.iterate import space_near
 from colloc.dynamics.compiled_period import CompiledPeriod
 from colloc.dynamics.dynamics import QuasiStatic, Shapes, TotalGradient
 from colloc.numerics.mesh import Mesh
@@ -182,6 +185,17 @@ for lengths in ((0.4, 0.6), (0.3, 0.2, 0.15, 0.35)):
     which = np.repeat(np.arange(len(checks.names)), 20)
     shapes = np.tile(at[0], len(checks.names))
     checks.slopes(which, shapes, checks.shares(which, shapes))
+for gait in (Harmonic(2), Polygon(6)):
+    for distance in (0.1, 2.0):  # the second is more than there is: a wider quadratic program
+        problem = Problem("x", gait=gait, joint_limit=1.2, at_least={"distance": distance})
+        space, v = space_near(problem, problem.guess)
+        program = ReducedProgram(space, 1e-3)
+        program.place_rows(v)
+        if isinstance(gait, Harmonic):
+            program.follow_worst()
+        assert program.constraints.kernel_rows is not None
+        compiled_search.nearest(program, v, np.eye(v.size), 1e-6, 5)
+        compiled_search.minimize(program, v, 0.4, 1e-9, 20)
 """
 
 

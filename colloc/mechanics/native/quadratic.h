@@ -8,7 +8,6 @@
 #include <string.h>
 
 #define PRIMAL_TOLERANCE 1e-10 /* what may be left of a limit, in units of its row */
-#define PRIMAL_FAILURE 1e-7 /* what is left counts as failure above this */
 #define DEPENDENT 1e-16 /* square of the part of a normal that is independent of the active ones, over its own */
 #define UNMET 1e3 /* price of half the squared share of the violations that stays */
 
@@ -128,6 +127,14 @@ static inline double limit(const Quadratic *p, int c, int sign)
     return c < p->m ? (sign < 0 ? p->row_high : p->row_low)[c] : (sign < 0 ? p->high : p->low)[c - p->m];
 }
 
+static bool all_finite(int n, const double *a)
+{
+    double sum = 0.0;
+    for (int i = 0; i < n; ++i)
+        sum += a[i] - a[i];
+    return sum == 0.0;
+}
+
 /* The constraint that d violates most, and its side; -1: none. */
 static int most_violated(const Quadratic *p, const double *d, double tolerance, int *sign)
 {
@@ -202,5 +209,5 @@ static bool quadratic_minimum(const Quadratic *p, ActiveSet *a, double *d, doubl
     for (int i = 0; i < a->count; ++i)
         if (a->constraint[i] < m)
             on_rows[a->constraint[i]] -= a->sign[i] * a->multiplier[i];
-    return true;
+    return all_finite(n, d);
 }

@@ -235,7 +235,7 @@ static void evaluate_point(
         for (int j = 0; j < n_joint && s->n_side; ++j)
             p->rates[j * n_time + t] /= p->pace[t];
     }
-    widest_period()(
+    const int no_memory = widest_period()(
         (int)s->n_link, s->length, s->mass, s->law, n_time, 0, n_time, p->angles, p->rates, s->delta, s->n_interval, (int)s->n_stage, s->A,
         s->b, s->h, s->points, s->turn, p->pace, angles, rates, from_delta, z, VELOCITY_TOLERANCE, p->z, p->out, p->totals,
         &lost);
@@ -259,6 +259,7 @@ static void evaluate_point(
         for (int i = 0; i < n; ++i)
             p->objective += 0.5 * (p->v[i] - s->target[i]) * (p->v[i] - s->target[i]);
     }
+    lost += no_memory;
     if (lost || !isfinite(p->objective))
         p->objective = NOWHERE;
     for (int k = 0; k < row - p->rows; ++k) {
@@ -286,10 +287,12 @@ static void differentiate(const Search *s, Work *w, const Point *p)
                 *on += slope[each] * by_totals[each][i];
         }
     }
-    if (count)
+    const int no_memory = count &&
         widest_period_vjp()(
             (int)s->n_link, s->length, s->mass, s->law, n_time, 0, n_time, p->angles, p->rates, s->delta, s->n_interval, (int)s->n_stage,
             s->A, s->b, s->h, s->points, s->turn, p->pace, p->z, p->out, count, w->on, w->on_shape, w->on_pace);
+    if (no_memory) /* no step from here */
+        w->on_shape[0] = NAN;
     if (s->target)
         for (int i = 0; i < n; ++i)
             w->gradient[i] = p->v[i] - s->target[i];
@@ -329,14 +332,6 @@ static void differentiate(const Search *s, Work *w, const Point *p)
     square_of_speed(s, p->v, to);
     for (int i = 0; i < n && s->target; ++i)
         to[n + i] = 2.0 * dot(n, s->area + i * n, p->v);
-}
-
-static bool all_finite(int n, const double *a)
-{
-    double sum = 0.0;
-    for (int i = 0; i < n; ++i)
-        sum += a[i] - a[i];
-    return sum == 0.0;
 }
 
 /* The step d from p, multipliers of the rows, and in `share` the share of the violations it removes: where rows contradict each
