@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq, root
 
 import colloc
-from colloc import Chain, Corners, Foot, Fourier, Friction, Pad, Wheel, replay, slope_motion
+from colloc import Chain, Corners, Foot, Fourier, Friction, Wheel, replay, slope_motion
 from colloc.gaits.regime import Regime
 from tests.shared.cases import slow
 from tests.shared.mechanics import coulomb, wrench
@@ -21,7 +21,6 @@ ON_FEET = Chain(
     -0.05), Foot(2, 0.9, 0.5)),
 )  # fmt: skip
 """Wheel, feet beside each other and a foot, whose weights press beside the centre of mass."""
-PADS = Chain((0.2, 0.5, 0.3), feet=(Pad(0, 0.5, 1.0), Wheel(1, 0.3), Pad(2, 0.2, 0.6)))
 
 
 def still(t):
@@ -70,16 +69,6 @@ def test_on_the_level_it_is_the_replay():
     assert ran.steering[0] == 1.0
 
 
-@pytest.mark.parametrize("body", [Chain(), slow(PADS)], ids=["lying", "pads"])
-def test_a_gentle_slope_changes_little_and_in_proportion(body):
-    level, gentle, twice = (
-        slope_motion(body, Friction(), SKEW, 0.1, g, tolerance=1e-8) for g in (0.0, 2e-4, 4e-4)
-    )
-    for name in ("turn", "climb"):
-        by, by_twice = (getattr(ran, name) - getattr(level, name) for ran in (gentle, twice))
-        assert by_twice == pytest.approx(2 * by, rel=1e-2)
-
-
 @pytest.mark.parametrize(
     ("body", "grade"), [slow((LOPSIDED, 0.4)), (ON_FEET, 0.25)], ids=["lying", "standing"]
 )
@@ -88,15 +77,6 @@ def test_joints_pay_for_friction_and_for_the_climb(body, grade):
     lifted = grade * ran.climb
     assert np.abs(lifted).min() > 1e-3
     np.testing.assert_allclose(ran.joint_work, ran.friction_work + lifted, atol=1e-9)
-
-
-@pytest.mark.parametrize("body", [slow(Chain()), ON_FEET], ids=["lying", "standing"])
-def test_a_mirrored_gait_drifts_to_the_other_side(body):
-    ran = slope_motion(body, Friction(), SKEW, 1e-2, 0.2, heading=0.9)
-    mirrored = slope_motion(body, Friction(), SKEW.mirrored, 1e-2, 0.2, heading=-0.9)
-    assert mirrored.climb == pytest.approx(ran.climb, abs=1e-5)
-    assert mirrored.aside == pytest.approx(-ran.aside, abs=1e-5)
-    assert mirrored.turn == pytest.approx(-ran.turn, abs=1e-5)
 
 
 def test_joints_at_rest_rest_on_any_slope_that_friction_holds():
@@ -165,13 +145,6 @@ def test_an_antipodal_gait_settles_along_the_fall_line():
     left = period(settled.headings[0] + 0.3, 4).headings - settled.headings[0]
     np.testing.assert_allclose(left[1:] / left[:-1], settled.steering[0], atol=3e-3)
     assert left[-1] < 0.9 * left[0]
-
-
-def test_a_body_that_turns_on_the_level_has_no_lasting_heading_on_a_gentle_slope():
-    at, headings = (Chain(), Friction(), SKEW, 1e-2, 0.02), np.linspace(-np.pi, np.pi, 4)[:3]
-    turns = [slope_motion(*at, heading=each, tolerance=1e-5).turn for each in headings]
-    assert len(set(np.sign(turns))) == 1
-    assert np.abs(turns).min() > 1e-4
 
 
 def test_the_steering_is_the_slope_of_the_map():
