@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Friction, Harmonic, Problem, ellipse, replay, solve
+from colloc import Chain, Fourier, Harmonic, Problem, ellipse, replay, solve
 from colloc.bounds.motions import admissible
 from colloc.dynamics.control_problem import control_problem
 from colloc.mechanics import contact as touching
@@ -349,36 +349,6 @@ def test_constraint_rows_hold_the_clearance_at_the_worst_instant_of_every_cell()
         assert (program.row_upper[rows] == 0).all()
         placed += cells.size
     assert placed > 5
-
-
-@pytest.mark.parametrize("lengths", [(0.5, 0.5), (0.3, 0.7)])
-@pytest.mark.parametrize(
-    "friction", [Friction(), Friction(mu_t=3, mu_f=1, mu_b=1), Friction(mu_t=0.5, mu_f=2, mu_b=2)]
-)
-def test_scallop_theorem(lengths, friction):
-    # one joint retraces its path; with equal speeds both ways nothing is left, whatever the delta
-    body = Chain(lengths)
-
-    def even(t):
-        return 0.3 + 1.5 * np.sin(2 * np.pi * t)[None], 3 * np.pi * np.cos(2 * np.pi * t)[None]
-
-    def uneven(t):
-        phase = 2 * np.pi * t + 0.6 * np.sin(2 * np.pi * t)
-        rate = 2 * np.pi * (1 + 0.6 * np.cos(2 * np.pi * t))
-        return 0.3 + 1.5 * np.sin(phase)[None], 1.5 * (np.cos(phase) * rate)[None]
-
-    for delta in (1e-1, 1e-4):
-        fine = replay(body, friction, even, delta, instants=100, most_instants=100)
-        assert fine.distance < 1e-10
-        assert fine.work > 0.1
-    # regularised friction depends on speed a little: different speeds there and back leave a
-    # distance of order delta
-    viscous, dry = (
-        replay(body, friction, uneven, delta, instants=400, most_instants=400).distance
-        for delta in (3e-1, 3e-3)
-    )
-    assert dry < 3e-3
-    assert dry < viscous / 3
 
 
 def test_two_links_cannot_gain_by_any_delta_or_harmonics_what_directional_friction_gives(solved):
