@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import Basis, BSpline, Chain, Fourier, Harmonic, Problem, Serpenoid, ellipse, load, save
+from colloc import Basis, BSpline, Chain, Fourier, Harmonic, Problem, Serpenoid, load, save
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.gaits.gait import SYMMETRIES
 from colloc.gaits.gait_fields import CLASSES as KINDS
@@ -252,13 +252,6 @@ def test_the_free_start_phase_is_removed_without_changing_the_path():
     phase = np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi)
     np.testing.assert_allclose(member.angles(T), gait.angles(T + phase), atol=1e-12)
     np.testing.assert_allclose(shift_phase(gait, 0.3).angles(T), gait.angles(T + 0.3), atol=1e-12)
-
-
-def test_the_paper_s_ellipse():
-    angles = ellipse(0.4, 1.1, 0.7).angles(T)
-    expected = 0.4 + 1.1 * np.cos(2 * np.pi * T) + 0.7 * np.sin(2 * np.pi * T)
-    np.testing.assert_allclose(angles[0], expected)
-    np.testing.assert_allclose(angles[1], -expected + 1.4 * np.sin(2 * np.pi * T), atol=1e-12)
 
 
 FIVE = Chain((0.2,) * 5)

@@ -47,19 +47,6 @@ def test_on_a_slope_that_part_of_gravity_counts_which_presses(unsolved):
     np.testing.assert_allclose(uphill.at(now), rates / period / 5)
 
 
-def test_robots_that_are_one_without_dimensions_are_one_problem():
-    """Twice as long, with periods longer by the root; three times as heavy."""
-    root = 2**0.5
-    motors = {"max_speed": 5 / root, "max_torque": (7.2, 6.0), "idle_power": 12 / root}
-    giant = Robot(length=1.24, mass=2.7, period=2.5 * root, **motors)
-    one, other = (Problem("snake", robot=robot).without_robot for robot in (SNAKE, giant))
-    names = ("froude", "speed_limit", "torque_limit")
-    for name in names:
-        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-14)
-    period = {"distance": 0.2, "driven_work": 0.6}
-    assert one.objective(period) == pytest.approx(other.objective(period), rel=1e-14)
-
-
 def test_what_follows_from_the_robot_is_neither_stated_nor_saved_beside_it():
     problem = Problem("snake", robot=SNAKE, objective="efficiency")
     again = Problem.from_dict(problem.to_dict())

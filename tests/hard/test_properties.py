@@ -57,25 +57,6 @@ def allowed(body, law, angles, rates, delta):
 
 @tried
 @given(instants(), friction, log_delta)
-def test_every_instant_converges(case, law, exponent):
-    body, angles, rates = case
-    result = solve_balance(body, law, angles, rates, 10.0**exponent)
-    assert result.converged.all()
-    # the body follows its joints: nothing outruns unit rates on a unit body by much
-    assert np.abs(result.z).max() < 10
-
-
-@tried
-@given(instants(), friction, log_delta, st.floats(-6, 6))
-def test_scaling_rates_and_delta_scales_the_velocity(case, law, exponent, scale):
-    body, angles, rates = case
-    k, delta = 10.0**scale, 10.0**exponent
-    one, other = (solved(body, law, angles, f * rates, f * delta) for f in (1.0, k))
-    np.testing.assert_allclose(other / k, one, atol=allowed(body, law, angles, rates, delta))
-
-
-@tried
-@given(instants(), friction, log_delta)
 def test_a_link_cut_by_a_frozen_joint_moves_as_before(case, law, exponent):
     body, angles, rates = case
     first, *rest = body.lengths
@@ -94,7 +75,9 @@ def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed(case, 
     of mass."""
     body, angles, rates = case
     delta = 10.0**exponent
-    now = instant(body, law, angles, rates, solved(body, law, angles, rates, delta), delta)
+    z = solved(body, law, angles, rates, delta)
+    assert np.abs(z).max() < 10  # the body follows its joints: nothing outruns unit rates by much
+    now = instant(body, law, angles, rates, z, delta)
     speed = np.hypot(*body.centre_velocity(now.posture, now.velocity)).item()
     power = total_power(now.velocity, now.force).item()
     assert power >= law.smallest * (speed - delta) - 1e-9 * law.largest

@@ -207,13 +207,6 @@ def test_the_elliptic_law_with_equal_coefficients_is_isotropic_friction_to_the_l
         np.testing.assert_array_equal(one, other)
 
 
-def test_sliding_straight_the_elliptic_law_is_coulomb_friction():
-    one, other = (law(mu_t=2, mu_f=1, mu_b=5) for law in (Elliptic, Friction))
-    for vs, vn in ((2.0, 0.0), (-2.0, 0.0), (0.0, 3.0)):
-        at = np.array([[vs]]), np.array([[vn]]), 1e-12
-        np.testing.assert_allclose(one.density(*at), other.density(*at), rtol=1e-14)
-
-
 @pytest.mark.parametrize(
     "law", [Viscous(), PowerLaw(0.5, mu_t=2.0), OWN], ids=lambda law: type(law).__name__
 )

@@ -214,20 +214,6 @@ def test_the_chord_does_not_depend_on_the_phase_that_a_period_is_begun_at():
     np.testing.assert_allclose(chords, chords[0], rtol=1e-9)
 
 
-def test_an_answer_states_the_chord_that_its_replay_finds():
-    turning = evaluate(Problem("turns", body=BODY, friction=FRICTION, delta=DELTA), GAIT)
-    assert abs(turning.rotation) > 0.05
-    assert turning.answer.distance == pytest.approx(turning.certificate.distance, rel=1e-5)
-    assert turning.answer.value == pytest.approx(turning.certificate.value, rel=1e-5)
-
-
-def test_the_chord_tends_to_the_displacement_as_the_turn_tends_to_nothing():
-    straight = replayed().distance
-    off = [abs(replayed(turn=turn).distance - straight) for turn in (1e-2, 1e-3, 1e-4)]
-    assert off[0] > off[1] > off[2]
-    assert off[2] == pytest.approx(off[1] / 10, rel=0.05)
-
-
 CASES = """
 series: gait=Harmonic(1)
 with inertia: gait=Harmonic(1), froude=0.05

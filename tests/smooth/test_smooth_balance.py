@@ -48,15 +48,6 @@ def test_many_starts_panels_and_methods_agree(motion, friction):
     assert_allclose(other.power, base.power, atol=2e-8)
 
 
-def test_scaling_of_rates_and_delta():
-    """z is homogeneous of degree one in (rates, delta)."""
-    motion = Wave("standing").prescribed()
-    twice = Motion(motion.angle, lambda s, t: 2 * motion.rate(s, t))
-    t = np.array([0.03, 0.4])
-    one, two = solve_smooth(motion, ANISOTROPIC, t, 1e-4), solve_smooth(twice, ANISOTROPIC, t, 2e-4)
-    assert_allclose(two.z, 2 * one.z, atol=1e-9)
-
-
 def test_uniform_rotation_of_the_frame_is_undone():
     """A shape that only turns its frame does not move: the frame turns back, and no work is
     done."""

@@ -113,12 +113,6 @@ def test_the_half_period_and_the_whole_agree():
     assert abs(b.rotation) < 1e-10
 
 
-@pytest.mark.parametrize("friction", [Friction(), Friction(mu_t=0.5, mu_f=1.0, mu_b=2.0), ALONG])
-def test_no_wave_beats_the_bound(friction):
-    for wave in (Wave("sine", 0.5, 2.0).prescribed(), Wave("sine", 1.2, 1.0).prescribed()):
-        assert period(wave, friction, 1e-4, intervals=1).efficiency < 1 / friction.smallest
-
-
 BODIES = [Wave(), Wave("tanh", 1.3, 2.0), Wave("standing")]
 BODIES += [Concertina(0.2), Concertina(0.1, bumps=2)]
 
