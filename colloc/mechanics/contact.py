@@ -264,7 +264,7 @@ def crossing_depth(
     """Depth to which links cross each other, the smallest distance from an end of one of two
     crossing segments to the other, and the width that they lack [body lengths], ``(n_time,)``; of
     the given pairs, by default of all."""
-    if not is_chain(body):
+    if not is_chain(body) or pairs == ():
         return np.zeros(angles.shape[1])
     ends = np.stack(body.joints(angles))
     near = _within_reach(ends, _pairs_apart(body.n_link, 2)) if pairs is None else list(pairs)

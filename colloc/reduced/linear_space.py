@@ -57,6 +57,7 @@ class LinearSpace(SearchSpace):
         self._peaks = keep_last(
             lambda v: near_peaks(self._gaits, self._table(v), self.mesh, self.checks, self._limit)
         )
+        self._at_worst = keep_last(self._constraints)
 
     def shape(self, v: np.ndarray) -> np.ndarray:
         """Parameters of the class, of serpenoid gaits with their Fourier coefficients."""
@@ -126,6 +127,9 @@ class LinearSpace(SearchSpace):
     def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         """Shape constraints at their worst instants in cells where they might bind, then the square
         of the shape speed."""
+        return self._constraints(v, later) if later else self._at_worst(v)
+
+    def _constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
         gaits, checks, mesh = self._gaits, self.checks, self.mesh
         which, cells, times = self._peaks(v)
         times = times + later * mesh.h[cells]

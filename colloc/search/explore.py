@@ -91,17 +91,17 @@ def first_optimum(problem: Problem, gait: AnyGait) -> Iterate:
     space, v = space_near(problem, gait)
     if not problem.gait.free:
         return optimise(space, v, problem.delta, FINE)
-    here = evaluate_at(space, v, problem.delta)
-    is_flat = here.kkt_error * COARSE <= OPTIONS.close * abs(here.objective)
-    if is_flat and here.violation < COARSE and problem.delta != problem.delta_start:
-        with suppress(NotConvergedError):
-            near = here if here.optimal else optimise(space, v, problem.delta, MEDIUM)
-            is_near = near.optimal and np.abs(near.v - v).max() < COARSE
-            if is_near and not regularisation_dominated(near):
-                return near
-    closed = project_to_zero_rotation(problem, gait, problem.delta_start)
-    space, v = space_near(problem, closed)
-    active_run().report("explore", 0, 1, evaluate_at(space, v, problem.delta_start))
+    if problem.delta != problem.delta_start:
+        here = evaluate_at(space, v, problem.delta)
+        is_flat = here.kkt_error * COARSE <= OPTIONS.close * abs(here.objective)
+        if is_flat and here.violation < COARSE:
+            with suppress(NotConvergedError):
+                near = here if here.optimal else optimise(space, v, problem.delta, MEDIUM)
+                is_near = near.optimal and np.abs(near.v - v).max() < COARSE
+                if is_near and not regularisation_dominated(near):
+                    return near
+    v = space.parameters(project_to_zero_rotation(problem, gait, problem.delta_start))
+    active_run().report("explore", 0, 1)
     for delta in delta_levels(problem, problem.delta_start):
         optimum = optimise(space, v, delta, MEDIUM)
         if not regularisation_dominated(optimum):

@@ -108,8 +108,10 @@ def crossing_pairs(space: SearchSpace, v: np.ndarray) -> Pairs:
     """Pairs of links more than two apart that cross at a thousand instants of a gait, by plain
     intersection: the smooth clearance keeps a distance that links which only touch do not need."""
     body, fraction = space.control.admissible.body, space.control.admissible.fraction
+    if not (pairs := far_pairs(body)):
+        return ()
     ends = np.stack(body.outline(space.member(v).angles(np.linspace(0.0, fraction, 1000))))
-    return overlapping_pairs(ends, far_pairs(body), link_width(body), TOLERANCES.violation)
+    return overlapping_pairs(ends, pairs, link_width(body), TOLERANCES.violation)
 
 
 def last_free(space: SearchSpace, free: np.ndarray, crossing: np.ndarray) -> np.ndarray:

@@ -53,14 +53,14 @@ def solve(
     search: str = REDUCED,
     keep: Path | None = None,
     progress: Callable[[Progress], object] = lambda progress: None,
-    accept: Callable[[Iterate], bool] = lambda first: True,
+    check: Callable[[Iterate], object] = lambda first: None,
 ) -> Solution:
     """The best gait of a problem's class that so many starts lead to, certified; see
     `colloc.solve`.
 
-    `keep` is a checkpoint file: a solve of the same problem goes on from what is there. `accept`
-    says whether the best gait, at the final delta and before its mesh is refined, is worth an
-    answer. After Ctrl-C, or once the time is over, the best gait so far is returned.
+    `keep` is a checkpoint file: a solve of the same problem goes on from what is there. `check` is
+    called with the best gait, at the final delta and before its mesh is refined; what it raises
+    ends the solve. After Ctrl-C, or once the time is over, the best gait so far is returned.
     """
     if search not in SEARCHES:
         raise ProblemError(f"search must be one of {', '.join(SEARCHES)}, not {search!r}.")
@@ -71,7 +71,7 @@ def solve(
             if search == FULL and problem.gait.free:
                 solution = certify_answer(reachable, solve_directly(reachable))
             else:
-                solution = _solve(reachable, starts, accept)
+                solution = _solve(reachable, starts, check)
             asked = problem.least_distance
             least = {aim.name: least for aim, least in reachable.at_least}.get("distance")
             if asked is not None and least is not None and least < asked:
@@ -92,7 +92,7 @@ def solve(
     return solution
 
 
-def _solve(problem: Problem, starts: int | None, accept: Callable[[Iterate], bool]) -> Solution:
+def _solve(problem: Problem, starts: int | None, check: Callable[[Iterate], object]) -> Solution:
     explored, failure = None, ""
     if starts != 1 and problem.gait.free:
         try:
@@ -101,8 +101,7 @@ def _solve(problem: Problem, starts: int | None, accept: Callable[[Iterate], boo
             failure = str(error)  # what fails with the guess alone is said in detail
     explored = explored or Exploration([first_optimum(problem, problem.guess)], 1)
     first = descend(explored.optima[0])
-    if not accept(first):
-        return Solution(problem, answer_of_iterate(first))
+    check(first)
     solutions = _finish_best(problem, (first, *explored.optima[1:]))
     if explored.left and not any(map(passes, solutions)):
         solutions += _finish_best(problem, follow_rest(problem, explored))

@@ -21,6 +21,7 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.problem_file import ProblemFile, read_problem_file
 from colloc.gaits.starts import LARGEST_SEED, LATIN_HYPERCUBE, SAMPLERS, start_gait
 from colloc.mechanics.native_kernel import native_kernel
+from colloc.results.answer import Step
 from colloc.results.archive import (
     CRASHED,
     ERROR,
@@ -339,22 +340,20 @@ def run_guess(
     over.
     """
     begin, cpu = time.perf_counter(), time.process_time()
-    passed, news = list[Iterate](), list[Progress]()
+    news = list[Progress]()
 
-    def accept(end: Iterate) -> bool:
+    def check(end: Iterate) -> None:
         if not worth(end):
-            passed.append(end)
-        return not passed
+            raise _NotWorthIt(end)
 
     guess = problem.guess
     try:
         guess = start_from()
         solution = search_solve(
-            problem.with_(guess=guess), 1, seconds=time_limit, progress=news.append, accept=accept
+            problem.with_(guess=guess), 1, seconds=time_limit, progress=news.append, check=check
         )
         if not solution.interrupted:
             outcome = _outcome(start, guess, solution)
-            outcome = replace(outcome, status=PASSED_OVER, message="") if passed else outcome
         elif time.perf_counter() - begin < time_limit:
             raise KeyboardInterrupt
         else:
@@ -363,6 +362,9 @@ def run_guess(
                 where = f"the last optimum was at delta = {solution.answer.delta:.1e}"
             message = f"gave up after {time_limit:g} s; {where}."
             outcome = Outcome(start, TIME_LIMIT, message, guess, guess)
+    except _NotWorthIt as stop:
+        end: Iterate = stop.args[0]
+        outcome = _of_steps(Outcome(start, PASSED_OVER, "", guess, end.gait), end.history)
     except Exception as error:
         outcome = Outcome(start, ERROR, f"{type(error).__name__}: {error}", guess, guess)
     return replace(
@@ -370,14 +372,23 @@ def run_guess(
     )
 
 
+class _NotWorthIt(Exception):
+    """Ends the solve of an optimum, its argument, that is passed over."""
+
+
 def _outcome(start: int, guess: AnyGait, solution: Solution) -> Outcome:
     status = TRIVIAL if is_trivial(solution.answer) else solution.status
-    iterations = sum(step.iterations for step in solution.history)
-    outcome = Outcome(start, status, solution.message, guess, solution.gait, iterations=iterations)
+    outcome = Outcome(start, status, solution.message, guess, solution.gait)
+    outcome = _of_steps(outcome, solution.history)
     if solution.certificate.replayed:
         numbers = {name: getattr(solution.certificate, name) for name in _CERTIFIED}
         return replace(outcome, delta=solution.answer.delta, **numbers)
-    if optimal := [step for step in solution.history if step.optimal]:
+    return outcome
+
+
+def _of_steps(outcome: Outcome, history: Iterable[Step]) -> Outcome:
+    outcome = replace(outcome, iterations=sum(step.iterations for step in history))
+    if optimal := [step for step in history if step.optimal]:
         last = optimal[-1]
         numbers = {name: getattr(last, name) for name in ("delta", "value", "distance", "work")}
         return replace(outcome, efficiency=last.distance / last.work, **numbers)

@@ -220,27 +220,27 @@ def visit(work: Work) -> Visit:
         before, now = (fourier_series(problem, gait) for gait in (best.outcome.gait, end.gait))
         return distance(before, now, problem.body, problem.law) > SAME_GAIT
 
-    def solve(origin: str, gait: AnyGait, delta_start: float) -> None:
+    def solve(origin: str, gait: AnyGait, stated: Problem) -> None:
         key = start_key(gait) + ("r" if origin == RESCUE else "")
         if key in work.tried or key in {a.key for a in attempts}:
             return
-        stated, number = problem.with_(delta_start=delta_start), len(attempts)
-        outcome = run_guess(stated, lambda: gait, number, work.time_limit, worth=worth)
+        outcome = run_guess(stated, lambda: gait, len(attempts), work.time_limit, worth=worth)
         attempts.append(Attempt(origin, key, outcome))
 
+    at_delta = problem.with_(delta_start=problem.delta)
     if work.first:
         for key in warm[: work.warm_starts]:
-            solve(WARM, members[key], problem.delta)
-        solve(GUESS, problem.guess, problem.delta_start)
+            solve(WARM, members[key], at_delta)
+        solve(GUESS, problem.guess, problem)
         for number in work.cold if problem.gait.free else ():
             cold = start_gait(problem, LATIN_HYPERCUBE, work.seed, number)
-            solve(COLD, cold, problem.delta_start)
+            solve(COLD, cold, problem)
     for key in warm:
         if scores[key] > enough():
-            solve(WARM, members[key], problem.delta)
+            solve(WARM, members[key], at_delta)
     nothing = not (work.incumbent or best_attempt(attempts))
     if warm and (scores[warm[0]] > enough() or nothing):
-        solve(RESCUE, members[warm[0]], problem.delta_start)
+        solve(RESCUE, members[warm[0]], problem)
     for key, gait in members.items():
         if scores[key] > enough():  # what remains is measured as finely as a certificate
             scores[key] = value_of(problem, gait, _FINE)

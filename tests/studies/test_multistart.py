@@ -224,7 +224,7 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
 
 
 def test_a_start_without_time_for_its_first_step_ends_at_the_time_limit(monkeypatch):
-    def silent(stated, starts, *, seconds, progress, accept):
+    def silent(stated, starts, *, seconds, progress, check):
         return replace(solve(stated, starts), interrupted=True, certificate=UNCERTIFIED)
 
     monkeypatch.setattr(campaign, "search_solve", silent)
