@@ -110,34 +110,36 @@ def _largest_rate(rates: np.ndarray) -> np.ndarray:
 def _solve(
     moving: Moving, starts: np.ndarray, method: str = "direct"
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solutions from starts ``(n_start, 3, n_time)``, and signs ``(n_start, n_time)``: 0 where none
-    is found, or a repeated one."""
+    """Solutions from starts ``(n_start, 3, n_time)``, NaN where there is no start or a solution is
+    repeated, and signs ``(n_start, n_time)``: 0 there, and where none is found."""
     count, n_time = starts.shape[0], starts.shape[2]
-    tiled = moving.at(np.tile(np.arange(n_time), count))
     z, largest = np.concatenate(list(starts), axis=1), _largest_rate(moving.rates)
+    unsolved, found = np.flatnonzero(~np.isnan(z[0])), np.zeros(z.shape[1], dtype=bool)
 
     def repeated(found: np.ndarray) -> np.ndarray:
         each = np.where(found, z, np.nan).reshape(3, count, n_time).transpose(1, 0, 2)
         return _repeat(each, largest).ravel()
 
-    unsolved = np.arange(z.shape[1])
     library = native_kernel(moving.body, moving.friction)
     if library is not None and method == "direct" and moving.load is None:
         # most starts lead to one velocity, which is solved for to all digits once
-        velocities, found = kernel_balances(library, tiled, z, _TOLERANCE)
-        z[:, found] = velocities[:, found]
-        unsolved = np.flatnonzero(~repeated(found))
-    part, sign = tiled.at(unsolved), np.zeros(z.shape[1])
+        part = moving.at(unsolved % n_time)
+        velocities, found[unsolved] = kernel_balances(library, part, z[:, unsolved], _TOLERANCE)
+        z[:, found] = velocities[:, found[unsolved]]
+        unsolved = unsolved[~repeated(found)[unsolved]]
+    part, sign = moving.at(unsolved % n_time), np.zeros(z.shape[1])
     solved = solve_balance(
         *part[:5], load=part.load, start=z[:, unsolved], tolerance=_TOLERANCE, method=method
     )
-    z[:, unsolved], found = solved.z, np.zeros(z.shape[1], dtype=bool)
+    z[:, unsolved] = solved.z
     found[unsolved] = (solved.residual <= _ACCEPTED) | solved.converged
-    new = np.flatnonzero((found & ~repeated(found))[unsolved])
+    again = repeated(found)
+    new = np.flatnonzero((found & ~again)[unsolved])
     for link, chosen in groups(solved.anchor[new]):  # seen from what rests, which loses no digits
         at = new[chosen]
         jacobian = _jacobian(part.at(at), solved.anchor_velocity[:, at], link)
         sign[unsolved[at]] = np.sign(np.linalg.det(jacobian))
+    z[:, again] = np.nan
     return z.reshape(3, count, n_time).transpose(1, 0, 2), sign.reshape(count, -1)
 
 
@@ -148,13 +150,13 @@ def _jacobian(moving: Moving, z: np.ndarray, reference: int | None = TAIL) -> np
 
 
 def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
-    """Starts ``(n_start, 3, n_time)`` between velocities, and along the softest direction of
-    each."""
+    """Starts ``(n_start, 3, n_time)`` between velocities, and along the softest direction of each;
+    NaN where a velocity is."""
     starts = [
         z[j] + part * (z[i] - z[j]) for i in range(len(z)) for j in range(i) for part in _BETWEEN
     ]
     for root in z:
-        softest = np.linalg.svd(_jacobian(moving, root))[2][:, 2].T
+        softest = np.linalg.svd(_jacobian(moving, np.nan_to_num(root)))[2][:, 2].T
         starts += [root + size * _largest_rate(moving.rates) * softest for size in _BESIDE]
     return np.stack(starts)
 
@@ -172,9 +174,14 @@ def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
 
 def _repeat(z: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Velocities ``(n, 3, n_time)`` that equal one before, ``(n, n_time)``; NaN equals none."""
-    return np.stack(
-        [(np.abs(z[:i] - z[i]).max(axis=1) < DISTINCT * speed).any(axis=0) for i in range(len(z))]
-    )
+    left = np.isfinite(z).all(axis=1)
+    again = left.copy()
+    while left.any():
+        first = np.argmax(left, axis=0)[None]
+        off = np.abs(z - np.take_along_axis(z, first[:, None], axis=0))
+        np.put_along_axis(again, first, False, axis=0)
+        left &= (off >= DISTINCT * speed).any(axis=1)
+    return again
 
 
 def _replace(
