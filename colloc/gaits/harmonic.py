@@ -140,6 +140,8 @@ class Fourier(GaitFunction):
 
     def resize(self, n_harmonic: int) -> Fourier:
         """The gait with harmonics added (zero) or cut."""
+        if type(self) is Fourier and n_harmonic == self.n_harmonic:
+            return self
         waves, both = np.zeros((2, self.n_joint, n_harmonic)), min(n_harmonic, self.n_harmonic)
         waves[..., :both] = self.cos[:, :both], self.sin[:, :both]
         return Fourier(self.mean, *waves)

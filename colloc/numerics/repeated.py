@@ -265,13 +265,15 @@ class Program:
 
     def pick(self, places: np.ndarray) -> sparse.csr_matrix:
         """Rows that are variables or outputs."""
-        places = np.ravel(places)
-        entries = np.ones(places.size), (np.arange(places.size), places)
-        return sparse.csr_matrix(entries, shape=(places.size, self.n + self._n_y + 1))
+        return self._one_each(np.ones(np.size(places)), np.ravel(places))
 
     def constant(self, values: np.ndarray) -> sparse.csr_matrix:
         """Rows that are numbers ``(n_row,)``."""
-        return sparse.diags(values) @ self.pick(np.full(values.size, self.n + self._n_y))
+        return self._one_each(values, np.full(values.size, self.n + self._n_y))
+
+    def _one_each(self, values: np.ndarray, places: np.ndarray) -> sparse.csr_matrix:
+        parts, count = (values, places, np.arange(values.size + 1)), self.n + self._n_y + 1
+        return sparse.csr_matrix(parts, shape=(values.size, count))
 
     def add(self, name: str, rows: sparse.spmatrix, lower: Any = 0.0, upper: Any = 0.0) -> None:
         """Add ``lower <= rows <= upper``; by default the rows vanish."""

@@ -303,8 +303,9 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
 
 def _best(iterates: Sequence[Iterate]) -> Iterate | None:
     """The best that may be the answer: of finite size, unless the problem asks for any."""
-    fit = (each for each in iterates if each.problem.shrinking or is_visible(each.gait))
-    return min(fit, key=lambda each: each.objective, default=None)
+    best_first = sorted(iterates, key=lambda each: each.objective)
+    fit = (each for each in best_first if each.problem.shrinking or is_visible(each.gait))
+    return next(fit, None)
 
 
 def sketch(

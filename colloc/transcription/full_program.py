@@ -376,7 +376,12 @@ class FullProgram(Program):
         return [*links, layout.accelerations, *self._momenta_and_pace()], shape
 
     def _spread(self, matrix: np.ndarray) -> sparse.csr_matrix:
-        return sparse.csr_matrix(sparse.kron(matrix, sparse.eye(self.mesh.n_point)))
+        part, of = np.nonzero(matrix)
+        every, n_point = np.arange(self.mesh.n_point), self.mesh.n_point
+        places = (n_point * part[:, None] + every).ravel(), (n_point * of[:, None] + every).ravel()
+        values = np.repeat(matrix[part, of], n_point)
+        shape = n_point * matrix.shape[0], n_point * matrix.shape[1]
+        return sparse.csr_matrix((values, places), shape=shape)
 
     def _on_links(self, output: int) -> sparse.csr_matrix:
         links, total = np.array(self.chain.contact.links), 0

@@ -207,12 +207,14 @@ def near_peaks(
     if checks.n_shape < every.size:
         shapes = np.concatenate([shapes, table @ gaits.functions(times, 1)], axis=1)
     most, size = np.empty((every.size, mesh.n)), max(1, _BLOCK // times.size)
+    best = np.empty(most.shape, dtype=int)
     for some in (slice(k, k + size) for k in range(0, every.size, size)):
         which = np.repeat(every[some], times.size)
         column = np.resize(np.arange(times.size), which.size)
         column += times.size * (which >= checks.n_shape)
-        highest = excess(which, checks.values(which, shapes, column=column))
-        most[some] = highest.reshape(-1, mesh.n, SAMPLES + 1).max(axis=2)
+        sampled = excess(which, checks.values(which, shapes, column=column))
+        sampled = sampled.reshape(-1, mesh.n, SAMPLES + 1)
+        most[some], best[some] = sampled.max(axis=2), sampled.argmax(axis=2)
     around = np.pad(most, ((0, 0), (1, 1)), constant_values=-np.inf)
     peak = (most >= around[:, :-2]) & (most >= around[:, 2:])
     which, cells = np.nonzero((most > -_NEAR) | (peak & (most > -_FAR)))
@@ -224,7 +226,9 @@ def near_peaks(
             values[at] = checks.values(of[at], shapes)
         return excess(of, values).reshape(t.shape)
 
-    return which, cells, peaks(at_times, mesh.edges[cells], mesh.h[cells])[0]
+    h, before = mesh.h[cells], np.clip(best[which, cells], 1, SAMPLES - 1) - 1
+    left = mesh.edges[cells] + h * fine[before]
+    return which, cells, peaks(at_times, left, 2 * h / SAMPLES, 2)[0]
 
 
 class Placed(NamedTuple):

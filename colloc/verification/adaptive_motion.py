@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -137,16 +138,18 @@ class FineMotion:
         weights = PANEL_RULE.lagrange(fraction.ravel()).reshape(*t.shape, -1)
         return np.einsum("...s,c...s->c...", weights, self.rates.z[:, k])
 
+    @cached_property
+    def _velocity_in_lab(self) -> np.ndarray:
+        turned = np.diff(self.edges)[:, None] * (self.rates.z[2] @ PANEL_RULE.A.T)
+        return np.exp(1j * (self.theta[:-1, None] + turned)) * self.rates.centre
+
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Orientation, displacement, work and quantities ``(n_time,)``."""
         k, fraction, h = self._locate(t)
         weights = PANEL_RULE.integrals(fraction) * h[k][:, None]
-        omega = self.rates.z[2]
-        turn = np.exp(1j * (self.theta[:-1, None] + h[:, None] * (omega @ PANEL_RULE.A.T)))
-        moved = turn * self.rates.centre
         return (
-            self.theta[k] + (weights * omega[k]).sum(axis=1),
-            self.path[k] + (weights * moved[k]).sum(axis=1),
+            self.theta[k] + (weights * self.rates.z[2, k]).sum(axis=1),
+            self.path[k] + (weights * self._velocity_in_lab[k]).sum(axis=1),
             *(self.totals[:, k] + (weights * self.rates.gained[:, k]).sum(axis=2)),
         )
 
@@ -202,7 +205,7 @@ def fine_motion(
         whole = (part[chosen] for part in parts)
         at_end = [a + b - both for a, b, both in zip(first, second, whole, strict=True)]
         half_way = [a - both for a, both in zip(first, middle, strict=True)]
-        rest = np.setdiff1d(np.arange(left.size), chosen)
+        rest = np.delete(np.arange(left.size), chosen)
         place = np.argsort(np.concatenate([left[rest], start]))
         left, width = (
             np.concatenate([old[rest], added])[place]

@@ -99,7 +99,8 @@ def first_panels(left: np.ndarray, width: np.ndarray, values: tuple[np.ndarray, 
     paired = [np.concatenate([a[::2, ::2], a[1::2, 2::2]], axis=1) for a in values]
     unknown = np.full_like(values[1], np.nan)
     pairs = Panels(left[::2], 2 * width[::2], *[*paired, np.empty(0), unknown[::2]])
-    return Panels(left, width, *[*values, np.repeat(changes(pairs)[0], 2, axis=0), unknown])
+    changed = changes(pairs, *poses(*increments(pairs)[:2]))[0]
+    return Panels(left, width, *[*values, np.repeat(changed, 2, axis=0), unknown])
 
 
 def increments(panels: Panels, rule: np.ndarray = WHOLE) -> tuple[np.ndarray, ...]:
@@ -118,11 +119,12 @@ def _integrals(rule: np.ndarray, h: np.ndarray, rates: np.ndarray) -> tuple[np.n
     return h * (omega @ b), h * ((turn * centre) @ b), *(h * (other @ b) for other in others)
 
 
-def changes(panels: Panels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def changes(
+    panels: Panels, heading: np.ndarray, place: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Changes by halving each panel of the period's rotation, distance, work and integrals ``(n, 3
-    + k)``, and the largest if the panel lay up to one, and up to two instants beside;
-    magnitudes."""
-    heading, place = poses(*increments(panels)[:2])
+    + k)``, and the largest if the panel lay up to one, and up to two instants beside; magnitudes,
+    from the `poses`."""
     _find_differences(panels)
     turned, moved, *others = panels.differences.transpose(2, 1, 0)
     # what comes after the panel turns with it
@@ -281,14 +283,14 @@ def replay(
             f"{instants!r}."
         )
     law = body.law(friction) if isinstance(body, Chain) else friction
-    residual, reach, shares = 0.0, 0.0, np.full(len(limits.names), -np.inf)
+    residual, shares = 0.0, np.full(len(limits.names), -np.inf)
 
     def state_at(
         t: np.ndarray, start: np.ndarray | None, *, whole: bool = False
     ) -> tuple[np.ndarray, ...]:
         """`Panels` z, rates, joint_power and apart at instants t ``(n, k)``, from tail velocities
         ``(3, n k)``; of several motions the nearest, or of a `whole` period the branch in time."""
-        nonlocal residual, reach, shares
+        nonlocal residual, shares
         angles, rates = path(t.ravel())
         at = body, law, angles, rates, delta
         now, apart = Instants(*at, joint_map=joint_map), np.zeros((3 + len(asked), t.size))
@@ -299,7 +301,6 @@ def replay(
         motion, left_over = accurate_motion(*at, start)
         now = replace(now, z=motion.z)
         residual = float(np.maximum(residual, left_over.max()))
-        reach = max(reach, lever(body, angles))
         if limits.names:
             shares = np.maximum(shares, limits.sizes(limits.at(now)).max(axis=1))
         centre = motion.centre[0] + 1j * motion.centre[1]
@@ -330,7 +331,7 @@ def replay(
                 "the path does not move, or too little to do work against friction: it has no "
                 "efficiency."
             )
-        changed, one_beside, two_beside = changes(panels)
+        changed, one_beside, two_beside = changes(panels, heading, place)
         missed = remaining_error(one_beside, two_beside, panels.wider).T
         missed[1] *= chord
         lost = dict(zip(names, missed, strict=True))
@@ -353,7 +354,7 @@ def replay(
         else:  # the branch on which the body is before
             start = old.z[:, :-1] if sense == FORWARDS else old.z[:, 1:]
         halves = old.halves(state_at(middles, start.reshape(-1, 3).T), changed[chosen])
-        panels = panels.take(np.setdiff1d(order, chosen)).join(halves)
+        panels = panels.take(np.delete(np.arange(order.size), chosen)).join(halves)
     # of two neighbouring instants the one at which others lead farther counts between them; a
     # rotation moves all of the way
     worse = np.maximum(panels.apart[:, :-1], panels.apart[:, 1:])
@@ -369,7 +370,7 @@ def replay(
         values=values,
         errors={name: float(lost[name].sum() + residual * sizes[name]) for name in names},
         others=dict(zip(names, map(float, others), strict=True)),
-        lever=reach,
+        lever=lever(body, path(known.ravel())[0]),
         actuator_work=float(((panels.joint_power @ WHOLE[-1]) * panels.width).sum()),
         residual=residual,
         error=float(gap.sum()) + residual,

@@ -145,8 +145,12 @@ def panels_of(power, n=16, corner=None):
     return panelled.first_panels(left, width, at_rest(power(t)))
 
 
+def changes(panels):
+    return panelled.changes(panels, *panelled.poses(*panelled.increments(panels)[:2]))
+
+
 def stated_work(panels):
-    return panelled.remaining_error(*panelled.changes(panels)[1:], panels.wider)[:, WORK].sum()
+    return panelled.remaining_error(*changes(panels)[1:], panels.wider)[:, WORK].sum()
 
 
 def slope_jump(x):
@@ -190,12 +194,12 @@ def test_changes_that_are_kept_are_those_that_would_be_found_again():
 
     panels = panels_of(power)
     for chosen in ([3, 4], [4, 5], [6, 9], [0, 10], [21]):
-        changed, old = panelled.changes(panels)[0], panels.take(np.array(chosen))
+        changed, old = changes(panels)[0], panels.take(np.array(chosen))
         middles = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
         rest = panels.take(np.setdiff1d(np.arange(panels.left.size), chosen))
         panels = rest.join(old.halves(at_rest(power(middles)), changed[chosen]))
         again = panels._replace(differences=np.full_like(panels.rates, np.nan))
-        for known, found in zip(panelled.changes(panels), panelled.changes(again), strict=True):
+        for known, found in zip(changes(panels), changes(again), strict=True):
             np.testing.assert_allclose(known, found, rtol=1e-12, atol=1e-15)
 
 
@@ -219,7 +223,7 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
         turn, move = twice[0].copy(), twice[1].copy()
         turn[k], move[k] = once[0][k], once[1][k]
         change, rel = abs(distance(turn, move) - distance(*twice[:2])), 3e-2 if steady else 1e-3
-        assert panelled.changes(panels)[0][k, 1] == pytest.approx(change, rel=rel, abs=1e-9)
+        assert changes(panels)[0][k, 1] == pytest.approx(change, rel=rel, abs=1e-9)
 
 
 AUDIT = (ROOT / "results/curated/audit.jsonl").read_text(encoding="utf-8")
