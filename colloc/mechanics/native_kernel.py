@@ -42,11 +42,12 @@ class _Array:
         return address(array) if isinstance(array, np.ndarray) else array
 
 
-def address(array: np.ndarray) -> Any:
-    assert array.flags.c_contiguous
-    if array.flags.writeable and array.size:
-        return ctypes.byref(ctypes.c_char.from_buffer(array.data))  # three times as fast
-    return ctypes.c_void_p(array.ctypes.data)
+def address(array: Any) -> Any:
+    try:
+        return ctypes.byref(ctypes.c_char.from_buffer(array))  # four times as fast
+    except (TypeError, ValueError):  # it is read-only, or empty
+        assert array.flags.c_contiguous
+        return ctypes.c_void_p(array.ctypes.data)
 
 
 def addresses(arguments: Iterable[Any]) -> tuple[Any, ...]:

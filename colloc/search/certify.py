@@ -178,8 +178,10 @@ def _rows(
         share = problem.robot.backlash / max(float(np.ptp(angles, axis=1).max()), 1e-300)
         meaning = "play of a joint over the angle by which the joint that moves most moves"
         yield BACKLASH, share, 1.0, meaning
-    leans = isinstance(body, Chain) and body.largest_imbalance > BALANCED
-    if leans and (lean := float(body.imbalance(angles).max())) > BALANCED:
+    lean = 0.0
+    if isinstance(body, Chain) and body.largest_imbalance > BALANCED:
+        lean = float(body.imbalance(angles).max())
+    if lean > BALANCED:
         meaning = "way from the centre of mass to where its weights press [body lengths]; "
         # the body is no longer than that
         yield "statics", lean, 1.0, f"{meaning}reported, not judged"

@@ -59,8 +59,9 @@ def solve(
     `colloc.solve`.
 
     `keep` is a checkpoint file: a solve of the same problem goes on from what is there. `check` is
-    called with the best gait, at the final delta and before its mesh is refined; what it raises
-    ends the solve. After Ctrl-C, or once the time is over, the best gait so far is returned.
+    called with the best gait, where the search has found it and at the final delta, before its mesh
+    is refined; what it raises ends the solve. After Ctrl-C, or once the time is over, the best gait
+    so far is returned.
     """
     if search not in SEARCHES:
         raise ProblemError(f"search must be one of {', '.join(SEARCHES)}, not {search!r}.")
@@ -100,6 +101,7 @@ def _solve(problem: Problem, starts: int | None, check: Callable[[Iterate], obje
         except NotConvergedError as error:
             failure = str(error)  # what fails with the guess alone is said in detail
     explored = explored or Exploration([first_optimum(problem, problem.guess)], 1)
+    check(explored.optima[0])
     first = descend(explored.optima[0])
     check(first)
     solutions = _finish_best(problem, (first, *explored.optima[1:]))

@@ -54,7 +54,7 @@ from colloc.results.comparison import (
     swap_ends,
 )
 from colloc.results.solution import SOLVED, versions
-from colloc.search.explore import with_reachable_distance
+from colloc.search.explore import same_gait, with_reachable_distance
 from colloc.search.iterate import Iterate, space_near
 from colloc.search.optimise import project_to_zero_rotation
 from colloc.smooth.smooth_body import SmoothBody
@@ -195,6 +195,7 @@ def visit(work: Work) -> Visit:
     than the search from it keeps, it is tried once more from the problem's own delta_start.
     """
     problem, attempts = with_reachable_distance(work.problem), list[Attempt]()
+    met = list[Iterate]()  # at a larger delta
     gaits = {start_key(gait): gait for gait in work.gaits}
     nearest = {key: member(problem, gait) for key, gait in gaits.items()}
     members = {key: gait for key, gait in nearest.items() if gait is not None}
@@ -212,6 +213,10 @@ def visit(work: Work) -> Visit:
         return (1 + BETTER) * max(work.incumbent, best.outcome.value if best else 0.0)
 
     def worth(end: Iterate) -> bool:
+        if end.delta > problem.delta:  # it would go on as an earlier start did from there
+            known = any(same_gait(problem, end, other) for other in met)
+            met.append(end)
+            return not known
         best = best_attempt(attempts)
         if not end.value > enough():
             return best is None and not work.incumbent

@@ -63,12 +63,10 @@ def rates_at(
     ascending phases, on one branch in time where several motions are balanced."""
     angles, rates = path(t.ravel())
     at = body, friction, angles, rates, delta
-    if near is None:
-        z = body.solve(*at[1:]).require().z
-        start = on_one_branch(*at, z)
-    else:
-        start = near.reshape(3, -1)
-    now = body.motion(*at[1:], body.solve(*at[1:], start=start).require())
+    solved = body.solve(*at[1:], start=None if near is None else near.reshape(3, -1)).require()
+    if near is None and (start := on_one_branch(*at, solved.z)) is not solved.z:
+        solved = body.solve(*at[1:], start=start).require()
+    now = body.motion(*at[1:], solved)
     seen = Instants(*at, z=now.z, joint_map=getattr(path, "joint_map", None))
     gained = np.stack([now.power, *(quantity.at(seen)[0] for quantity in quantities)])
     rows = now.z, (now.centre[0] + 1j * now.centre[1]) * np.exp(-1j * turn * t.ravel()), gained
