@@ -62,6 +62,8 @@ class SearchSpace:
 
     lower = upper = _EMPTY
     own = np.arange(0)
+    motion: ReducedMotion | None = None
+    """Of the last search there."""
 
     def __init__(
         self,

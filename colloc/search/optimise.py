@@ -96,6 +96,7 @@ def optimise(
             break
         start, hessian = last_free(space, v, end), None
         space = space_of(space.control.problem, space.edges, space.scheme, space.far + crossing)
+    space.motion = program.motion
     return evaluate_at(
         *(space, end, delta, kkt, program, conditions),
         iterations=iterations,
@@ -164,7 +165,9 @@ def descend(iterate: Iterate) -> Iterate:
 def regularisation_dominated(iterate: Iterate) -> bool:
     """True if the gait loses half of its value at the next delta, as slow parts of a retraced gait
     do."""
-    drier = ReducedProgram(iterate.space, OPTIONS.delta_ratio * iterate.delta)
+    space = iterate.space
+    drier = ReducedProgram(space, OPTIONS.delta_ratio * iterate.delta)
+    drier.motion = space.motion or drier.motion  # which knows velocities to begin from
     kept = (1 - OPTIONS.lost) * abs(iterate.objective)
     return not drier.objective(iterate.v) <= iterate.objective + kept
 
