@@ -95,8 +95,7 @@ class ShapeChecks:
 
     def fresh_shares(self, which: np.ndarray, shapes: np.ndarray) -> np.ndarray:
         shares = np.full(which.size, -1.0)
-        on_stretch = which < self.n_angle if self._stretches else np.zeros(which.size, bool)
-        for k in np.unique(which[on_stretch]):
+        for k in np.unique(which[which < self.n_angle]) if self._stretches else ():
             shares[which == k] = self._largest(int(k), shapes[:, which == k])
         return shares
 
@@ -215,7 +214,8 @@ def near_peaks(
         sampled = excess(which, checks.values(which, shapes, column=column))
         sampled = sampled.reshape(-1, mesh.n, SAMPLES + 1)
         most[some], best[some] = sampled.max(axis=2), sampled.argmax(axis=2)
-    around = np.pad(most, ((0, 0), (1, 1)), constant_values=-np.inf)
+    around = np.full((every.size, mesh.n + 2), -np.inf)
+    around[:, 1:-1] = most
     peak = (most >= around[:, :-2]) & (most >= around[:, 2:])
     which, cells = np.nonzero((most > -_NEAR) | (peak & (most > -_FAR)))
 
