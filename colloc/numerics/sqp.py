@@ -73,11 +73,12 @@ class Stationarity:
     on_bounds: np.ndarray
 
 
-def binding(program: NonlinearProgram, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _binding(
+    slopes: np.ndarray, values: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Indices of rows and bounds, counted on, that may carry a multiplier at their upper and lower
     ends; and their gradients ``(n, n_binding)``, those at lower ends negated."""
-    values, lower, upper = _rows_and_bounds(program, v)
-    unit = np.vstack([program.row_slopes(v), np.eye(v.size)])
+    unit = np.vstack([slopes, np.eye(slopes.shape[1])])
     high, low = np.flatnonzero(values > upper - _ACTIVE), np.flatnonzero(values < lower + _ACTIVE)
     return high, low, np.concatenate([unit[high], -unit[low]]).T
 
@@ -96,7 +97,7 @@ def stationarity(program: NonlinearProgram, v: np.ndarray) -> Stationarity:
     if not v.size:
         return Stationarity(0.0, 0.0, 0.0, np.zeros(program.row_lower.size), np.empty(0))
     gradient, (values, lower, upper) = program.gradient(v), _rows_and_bounds(program, v)
-    high, low, columns = binding(program, v)
+    high, low, columns = _binding(program.row_slopes(v), values, lower, upper)
     multipliers, left = np.zeros(values.size), gradient
     if columns.size and np.isfinite(columns).all() and np.isfinite(gradient).all():
         on = nonnegative(columns, -gradient)
@@ -128,7 +129,8 @@ def stationarity_around(
     """Replace the KKT error at v by that of the best mean of the gradients within `radius`; `at`
     itself if none is closer to 0, or some point around is clearly lower. `points` are drawn per
     variable, until a mean is within `enough` of 0."""
-    rows, slopes, columns = program.rows(v), program.row_slopes(v), binding(program, v)[2]
+    rows, slopes = program.rows(v), program.row_slopes(v)
+    columns = _binding(slopes, *_rows_and_bounds(program, v))[2]
     rng = np.random.default_rng(0)
 
     def lagrangian(u: np.ndarray) -> np.ndarray:
