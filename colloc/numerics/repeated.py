@@ -272,14 +272,15 @@ class Program:
         return self._one_each(values, np.full(values.size, self.n + self._n_y))
 
     def _one_each(self, values: np.ndarray, places: np.ndarray) -> sparse.csr_matrix:
-        parts, count = (values, places, np.arange(values.size + 1)), self.n + self._n_y + 1
-        return sparse.csr_matrix(parts, shape=(values.size, count))
+        ends = np.arange(values.size + 1, dtype=np.int32)  # as SciPy keeps indices
+        shape = values.size, self.n + self._n_y + 1
+        return sparse.csr_matrix((values, places.astype(np.int32), ends), shape=shape)
 
-    def add(self, name: str, rows: sparse.spmatrix, lower: Any = 0.0, upper: Any = 0.0) -> None:
+    def add(self, name: str, rows: sparse.csr_matrix, lower: Any = 0.0, upper: Any = 0.0) -> None:
         """Add ``lower <= rows <= upper``; by default the rows vanish."""
         m = rows.shape[0]
         self.groups[name] = slice(self.row_lower.size, self.row_lower.size + m)
-        self.rows.append(sparse.csr_matrix(rows))
+        self.rows.append(rows)
         self.row_lower = np.append(self.row_lower, np.zeros(m) + lower)
         self.row_upper = np.append(self.row_upper, np.zeros(m) + upper)
 

@@ -288,8 +288,8 @@ def replay(
     def state_at(
         t: np.ndarray, start: np.ndarray | None, *, whole: bool = False
     ) -> tuple[np.ndarray, ...]:
-        """`Panels` z, rates, joint_power and apart at instants t ``(n, k)``, from tail velocities
-        ``(3, n k)``; of several motions the nearest, or of a `whole` period the branch in time."""
+        """`Panels` z, rates, joint_power and apart at instants t, from tail velocities ``(3,
+        t.size)``; of several motions the nearest, or of a `whole` period the branch in time."""
         nonlocal residual, shares
         angles, rates = path(t.ravel())
         at = body, law, angles, rates, delta
@@ -314,10 +314,13 @@ def replay(
     pieces = [(a, b, 2 * max(1, round(instants * (b - a) / 8))) for a, b in pairwise(ends)]
     edges = np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), 1.0)
     t = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, 5)
+    t[:, 4] = edges[1:]
     t[np.isin(edges[:-1], breaks), 0] += ONE_SIDED
     t[np.isin(edges[1:], breaks), 4] -= ONE_SIDED
-    first = None if near is None else near.tail_velocity(t.ravel())
-    panels = first_panels(edges[:-1], np.diff(edges), state_at(t, first, whole=True))
+    once, place = np.unique(t, return_inverse=True)  # neighbours share an instant
+    state = state_at(once, None if near is None else near.tail_velocity(once), whole=True)
+    values_there = tuple(each[place.reshape(t.shape)] for each in state)
+    panels = first_panels(edges[:-1], np.diff(edges), values_there)
     names = "rotation", "distance", "work", *(each.name for each in asked)
     chord = chord_per_way(turn)
     while True:
