@@ -148,8 +148,8 @@ def phase_distance(a: Fourier, b: Fourier) -> float:
     k = np.arange(1, n + 1)
     # sum over joints of conj(a_k) b_k: shifting b by phase x multiplies it by exp(i k x)
     overlap = np.sum((a.cos + 1j * a.sin) * (b.cos - 1j * b.sin), axis=0)
-    x = 2 * np.pi * np.arange(64 * n) / (64 * n)
-    x = x[np.argmax((np.exp(1j * np.outer(x, k)) @ overlap).real)]
+    sampled = np.fft.ifft(np.append(0.0, overlap), 64 * n).real
+    x = 2 * np.pi * np.argmax(sampled) / (64 * n)
     for _ in range(6):
         wave = overlap * np.exp(1j * k * x)
         slope, curvature = float((1j * k * wave).real.sum()), float(-(k**2 * wave).real.sum())
