@@ -203,7 +203,10 @@ def on_fine_mesh(problem: Problem, gait: AnyGait) -> Answer:
         if plan is None:
             break
         mesh = Mesh(scheme(plan.scheme), plan.edges)
-        message = "" if plan.reached else f"the mesh is accurate to {plan.estimate:.0e} only."
+        if plan.reached:  # as the gait stays where it is
+            message = ""
+            break
+        message = f"the mesh is accurate to {plan.estimate:.0e} only."
     if mesh is not first:
         answer = on_mesh(problem, gait, mesh)
     answer = replace(answer, message=message, seconds=time.perf_counter() - begin)

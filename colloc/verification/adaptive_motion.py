@@ -125,10 +125,10 @@ class FineMotion:
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 
     def _locate(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Panels of phases, fractions of these, lengths of all panels."""
+        """Panels of phases, fractions of these, and their lengths."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
-        h = np.diff(self.edges)
-        return k, (t - self.edges[k]) / h[k], h
+        h = self.edges[k + 1] - self.edges[k]
+        return k, (t - self.edges[k]) / h, h
 
     def velocity(self, t: np.ndarray) -> np.ndarray:
         """Tail velocities ``(3, ...)`` by the panels' polynomials."""
@@ -144,7 +144,7 @@ class FineMotion:
     def at(self, t: np.ndarray) -> tuple[np.ndarray, ...]:
         """Orientation, displacement, work and quantities ``(n_time,)``."""
         k, fraction, h = self._locate(t)
-        weights = PANEL_RULE.integrals(fraction) * h[k][:, None]
+        weights = PANEL_RULE.integrals(fraction) * h[:, None]
         return (
             self.theta[k] + (weights * self.rates.z[2, k]).sum(axis=1),
             self.path[k] + (weights * self._velocity_in_lab[k]).sum(axis=1),
