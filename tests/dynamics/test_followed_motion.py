@@ -22,14 +22,13 @@ def random_path(seed):
     return Fourier(rng.uniform(-0.8, 0.8, 2), *rng.normal(0, 0.8, (2, 2, 2)))
 
 
-def step_by_step(path, sense, n=2500):
+def step_by_step(path, n=2500):
     """Efficiency of a body in small steps, each solved from the one before."""
     t = (np.arange(n) + 0.5) / n
     angles, rates = path(t)
     z = solve_balance(BODY, STEEP, angles[:, :1], rates[:, :1], 1e-4).z
-    order = np.arange(n)[::sense]
     parts = np.empty((n, 4))
-    for i in [*order, *order[:5]]:  # a few more, in case the first was on another branch
+    for i in [*range(n), *range(5)]:  # a few more, in case the first was on another branch
         at = (BODY, STEEP, angles[:, [i]], rates[:, [i]], 1e-4)
         solved = solve_balance(*at, start=z)
         z = solved.z
@@ -54,15 +53,17 @@ def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
     assert found.others["distance"] > moves + turns * found.distance
 
 
-@pytest.mark.parametrize("sense", [FORWARDS, slow(BACKWARDS)])
-def test_the_replay_follows_the_branch_in_time(sense):
-    at = BODY, STEEP, random_path(5), 1e-4
-    followed, other = (replay(*at, sense=s) for s in (sense, -sense))
-    expected = step_by_step(at[2], sense)
+def test_the_replay_follows_the_branch_in_time_and_against_it_as_if_the_gait_were_reversed():
+    path = random_path(5)
+    at, reverse = (BODY, STEEP, path, 1e-4), Fourier(path.mean, path.cos, -path.sin)
+    followed, other = (replay(*at, sense=s) for s in (FORWARDS, BACKWARDS))
+    expected = step_by_step(path)
     assert abs(followed.efficiency / expected - 1) < 5e-4
     assert abs(other.efficiency / expected - 1) > 5e-3
+    back = replay(BODY, STEEP, reverse, 1e-4)
+    assert (other.work, other.distance) == pytest.approx((back.work, back.distance), rel=1e-6)
     # a motion to start from does not decide the branch
-    again = replay(*at, sense=sense, near=other).efficiency
+    again = replay(*at, near=other).efficiency
     assert again == pytest.approx(followed.efficiency, rel=1e-9)
 
 
@@ -147,7 +148,7 @@ def random_instants(seed, count, n_joint=2):
     return rng.uniform(-np.pi, np.pi, (n_joint, count)), rates / np.abs(rates).max(axis=0)
 
 
-def test_the_printed_instant_has_three_motions_and_the_middle_one_is_unstable():
+def test_the_printed_instant_has_three_motions_and_no_body_goes_on_in_the_unstable_middle_one():
     found = all_balanced_velocities(Chain(), ONE_WAY, *PRINTED, 1e-4)
     assert found.number == [3]
     spin = found.z[:, 2, 0]
@@ -155,6 +156,10 @@ def test_the_printed_instant_has_three_motions_and_the_middle_one_is_unstable():
     np.testing.assert_allclose(spin[order], [2.95957, 2.99418, 2.99826], atol=5e-6)
     assert found.sign[order, 0].tolist() == [1, -1, 1]
     assert found.complete.all()
+    at = Instants(Chain(), ONE_WAY, *PRINTED, 1e-4)
+    for before, lasting in zip(order, (order[0], order[2], order[2]), strict=True):
+        went, _ = solution_branches.followed_motion(at, before=found.z[before])
+        np.testing.assert_array_equal(went, found.z[lasting])
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
@@ -189,7 +194,9 @@ def test_equal_coefficients_have_one_motion(n_joint):
         ((1, 1, 3), (1 / 3,) * 3, 0),
     ],
 )
-def test_the_signs_of_all_motions_add_up_to_one(law, lengths, several):
+def test_the_signs_of_all_motions_add_up_to_one_and_those_that_last_say_what_is_open(
+    law, lengths, several
+):
     """As the degree of the map demands; so none is missing, or they are missing in pairs."""
     body, friction = Chain(lengths), coulomb(*law)
     angles, rates = random_instants(2, 2000, body.n_joint)
@@ -201,6 +208,12 @@ def test_the_signs_of_all_motions_add_up_to_one(law, lengths, several):
         now = instant(body, friction, angles[:, at], rates[:, at], z[:, at], 1e-4)
         assert np.abs(net_force(now.posture, now.force)).max(initial=0.0) < 1e-9 * friction.largest
         assert np.isnan(z[:, sign == 0]).all()
+    apart = solution_branches.followed_motion(Instants(body, friction, angles, rates, 1e-4))[1]
+    for k in np.flatnonzero(found.number > 1):
+        z = found.z[found.sign[:, k] > 0, :, k].T
+        at = (np.repeat(each[:, [k]], z.shape[1], axis=1) for each in (angles, rates))
+        spread = np.ptp(body.sliding(friction, *at, z, 1e-4).power), np.ptp(z[2])
+        np.testing.assert_allclose(apart[[2, 1], k], spread, rtol=1e-9)
 
 
 def test_links_at_rest_find_at_least_what_hundreds_of_random_starts_find():

@@ -89,6 +89,7 @@ def test_polygons_have_the_corners_and_the_symmetry_they_promise(corners, axis):
     heading = np.arctan2(*gait.rates(t)[::-1])
     turns = (heading - np.roll(heading, 1) + 1) % (2 * np.pi) - 1
     assert np.sum(np.abs(turns) > 1e-6) == corners
+    assert (abs(turns[0]) > 1e-6) == (axis == "corner")  # where the axis first meets it
     np.testing.assert_allclose(gait.angles(-t), -gait.angles(t)[::-1], atol=1e-8)
 
 

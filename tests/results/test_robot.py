@@ -194,6 +194,15 @@ def test_at_the_pace_that_is_slow_enough_inertia_takes_one_percent(three_link, r
     assert f"would move at {three_link.distance * 1.2 / 5:.4g} m/s" in str(robot)
 
 
+def test_of_a_gait_that_turns_so_slowly_that_inertia_does_nothing_no_rotation_is_its_doing():
+    gait = Fourier([1.0, 1.1], [[-1.0], [0.7]], [[1.0], [0.9]])
+    turns = evaluate(Problem("turns", delta=3e-2, mesh_tolerance=1e-2), gait)
+    facts = turns.robot(**SLOW).facts
+    assert abs(turns.rotation) > 0.3
+    assert facts["rotation_by_inertia_rad"] == pytest.approx(0.0, abs=1e-4)
+    assert facts["inertia_takes"] == pytest.approx(0.0, abs=1e-4)
+
+
 @pytest.fixture(scope="module")
 def braking(once):
     """At this pace links swing on, and joint 1 brakes harder than it drives."""

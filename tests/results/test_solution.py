@@ -263,6 +263,6 @@ def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
 @pytest.mark.parametrize(
     ("way", "word"), [((1, 1), "head first"), ((-1, -1), "tail first"), ((1, -1), "sideways")]
 )
-def test_a_body_that_lies_askew_travels_the_way_it_points_or_another(way, word):
-    tail = np.outer(way, [0.0, 1.0])
-    assert direction_of_travel(tail + 0.2, tail) == word
+def test_a_body_that_lies_askew_travels_the_way_it_points_in_the_mean_or_another(way, word):
+    tail = np.outer(way, [0.0, 1.0, 2.0])
+    assert direction_of_travel(tail + 0.2 * np.array([-1.0, 2.0, 2.0]), tail) == word

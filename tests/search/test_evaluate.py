@@ -250,12 +250,15 @@ def test_a_series_that_misses_its_samples_states_its_lack_of_fit():
     assert enough.certificate.efficiency_error < 1e-6 < 1e3 * enough.certificate.efficiency_error
 
 
-def test_errors_of_samples_are_kept_and_are_no_disagreement(tmp_path):
+def test_errors_of_samples_are_in_units_of_friction_and_kept_and_no_disagreement(tmp_path):
     noisy = GAIT.angles(np.arange(N) / N) + 0.01 * np.random.default_rng(0).normal(size=(2, N))
     path = colloc.save(colloc.evaluate(QUICK, noisy), tmp_path / "x.h5")
     loaded = colloc.load(path)
     assert loaded.certificate.value_error > loaded.certificate.of_samples[0] > 1e-4
     assert loaded.certificate.facts()["errors_of_samples"] == list(loaded.certificate.of_samples)
+    rough = colloc.evaluate(QUICK.with_(friction=colloc.Friction(100, 100, 100)), noisy)
+    by_friction = loaded.certificate.of_samples * np.array([0.01, 0.01, 1.0, 100.0])
+    np.testing.assert_allclose(rough.certificate.of_samples, by_friction, rtol=1e-3)
     assert main(["verify", str(path), "--quiet"]) == 0
 
 

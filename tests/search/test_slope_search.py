@@ -9,6 +9,7 @@ from colloc import BSpline, Chain, Friction, Harmonic, Pad, Polygon, Problem, el
 from colloc.commands.results import verify
 from colloc.commands.solve import summary_lines
 from colloc.dynamics.control_problem import control_problem
+from colloc.dynamics.dynamics import PeriodTotals
 from colloc.gaits.gait import delta_per_period
 from colloc.gaits.gait_fields import fields, gait_from
 from colloc.mechanics.bodies import FULL
@@ -176,6 +177,9 @@ def test_a_slope_that_is_not_climbed_is_said_so():
     found = solve(PROBLEM.with_(grade=0.9, delta=0.1), 1)
     assert found.status == "not converged"
     assert "no gait was found that climbs a grade of 0.9" in found.message
+    # down it joints may brake more than they drive, which is no efficiency
+    down = control_problem(PROBLEM).dynamics.totals(PeriodTotals(-11.0, 0.0, 1.0))
+    assert np.isnan(PROBLEM.objective(down))
 
 
 def bump(t):

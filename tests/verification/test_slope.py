@@ -179,6 +179,11 @@ def test_a_replay_on_a_slope_says_for_which_part_of_the_time_its_motion_is_open(
     waves = rng.uniform(-0.8, 0.8, 2), rng.normal(0, 0.8, (2, 2)), rng.normal(0, 0.8, (2, 2))
     at = Chain(), law, Fourier(*waves, theta=0.3), 1e-2
     replayed = replay(*at, regime=Regime(grade=0.02), tolerance=1e-3, instants=400)
-    open_for = slope_motion(*at, grade=0.02, tolerance=1e-3).several
-    assert 1e-3 < open_for < 1e-2
-    assert replayed.several == pytest.approx(open_for, rel=0.3)
+    both = slope_motion(*at, grade=0.02, tolerance=1e-3, periods=2)
+    first, then = (slope_motion(*at, 0.02, heading=h, tolerance=1e-3) for h in both.headings[:2])
+    assert 1e-3 < first.several < 1e-2
+    assert replayed.several == pytest.approx(first.several, rel=0.3)
+    assert both.several == pytest.approx(0.5 * (first.several + then.several), rel=0.2)
+    for name in ("climb", "aside", "friction_work", "joint_work", "steering"):
+        parts = np.append(getattr(first, name), getattr(then, name))
+        np.testing.assert_allclose(getattr(both, name), parts, atol=1e-3)
