@@ -210,6 +210,9 @@ def test_friction_of_an_mjcf_is_that_of_geoms_on_the_floor_what_is_left_is_said(
     floor = SWIMMER.replace('<geom type="plane"', '<geom type="plane" friction="0.2"')
     slippery = floor.replace('<geom type="capsule"', '<geom type="capsule" friction="0.4 0.01"')
     assert read(tmp_path, slippery, kind="xml").friction == Friction(0.4, 0.4, 0.4)
+    rough = '<geom type="plane" friction="0.6"/><geom type="plane"'
+    steps = slippery.replace('<geom type="plane"', rough)
+    assert read(tmp_path, steps, kind="xml").friction == Friction(0.6, 0.6, 0.6)
     assert read(tmp_path, floor, kind="xml").friction == Friction(1, 1, 1)
     assert read(tmp_path, slippery, "--mu", "0.3", kind="xml").friction.mu_t == 0.3
     capsys.readouterr()

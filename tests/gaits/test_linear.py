@@ -77,6 +77,8 @@ def test_what_a_class_says_of_its_parameters_is_true_of_its_gaits(gait_class, bo
     v, (first, second) = gait_class.parameters(gait), gait.angles(t)
     square = (gait.rates(t) ** 2).sum(axis=0).mean()
     assert v @ gait_class.mean_square_rate(2) @ v == pytest.approx(square, rel=1e-4)
+    assert (2 * np.pi * gait.shape_speed) ** 2 == pytest.approx(square, rel=1e-4)
+    np.testing.assert_allclose(gait.mean, gait.angles(t).mean(axis=1), atol=1e-6)
     area = 0.5 * np.sum(first * np.roll(second, -1) - second * np.roll(first, -1))
     assert v @ enclosed_area(gait_class, 2) @ v == pytest.approx(area, rel=1e-4, abs=1e-9)
     np.testing.assert_allclose(gait.scaled(-3.0).angles(t), -3.0 * gait.angles(t))

@@ -136,6 +136,7 @@ def test_a_figure_of_a_robot_has_its_units(slow_robot):
     figure.draw_without_rendering()
     strip, lab, angles, speeds, power = figure.axes
     way = 62 * np.ptp(slow_robot.sample(np.array([0.0, 1.0])).centre[0])
+    assert strip.texts[-2].get_text() == "600"
     assert strip.texts[-1].get_text() in (f"{way:.1f}", f"−{way:.1f}")
     delta = slow_robot.delta_per_period * 62 / 600
     np.testing.assert_allclose(speeds.lines[-1].get_ydata(), delta)

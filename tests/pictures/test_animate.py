@@ -76,13 +76,19 @@ def test_robots_side_by_side_are_drawn_in_metres_and_seconds():
     robots = (colloc.Robot(length=x, mass=1, period=t) for x, t in ((0.6, 400), (0.3, 100)))
     stated = (colloc.Problem("robot", gait=colloc.Harmonic(1), robot=robot) for robot in robots)
     big, small = (colloc.evaluate(each, colloc.ellipse(A0=0, A1=1.5, B1=1.0)) for each in stated)
-    drawn = [extents(picture) for picture in pictures(big, 8, 1, arrows=False, beside=small)]
+    film = list(pictures(big, 8, 1, arrows=False, beside=small))
+    drawn = [extents(picture) for picture in film]
     turned = pictures(small, 8, 1, arrows=False, beside=big)
     np.testing.assert_allclose([extents(picture)[::-1] for picture in turned], drawn, atol=2)
     lines = 9.0  # of joints and head, whose size does not change [pixels]
     (long, short), (_, again) = drawn[0], drawn[2]
     np.testing.assert_allclose(np.subtract(long, lines), 2 * np.subtract(short, lines), atol=9)
     np.testing.assert_allclose(again, short, atol=2)
+    # squares are of 10 cm, but where both halves meet
+    sides = np.diff(np.flatnonzero(np.median(film[0].mean(axis=2), axis=0) < 253))
+    assert (np.abs(sides - np.median(sides)) > 1).sum() == 1
+    size = 0.6 * np.ptp(lab_outline(big.problem.body, big.sample(0.0)), axis=(1, 2))[::-1]
+    np.testing.assert_allclose(np.subtract(long, lines), size / 0.1 * np.median(sides), atol=9)
 
 
 def test_friction_turns_with_a_body_that_turns_cycle_by_cycle(monkeypatch):

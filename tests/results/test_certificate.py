@@ -263,6 +263,13 @@ def test_other_motions_count_as_error_and_explain_gaps(failures, three_link, rep
     known = certify(three_link.answer)
     assert min(known.efficiency_error, known.error_at_zero_delta) >= 5e-3 * known.efficiency
     assert known.errors["work"] >= 5e-3 * known.work
+    # a rotation that is too much carries other points of the body elsewhere
+    monkeypatch.setattr(
+        replay_module, "replay", lambda *a, **k: changed(replays[a[3]], rotation=1e-3)
+    )
+    known = certify(three_link.answer)
+    assert known.errors["distance"] >= 1e-3 * fine.lever >= 1e-3 / 3
+    assert known.efficiency_error >= 1e-3 * fine.lever / known.work
 
 
 def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):

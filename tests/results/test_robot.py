@@ -224,9 +224,15 @@ def test_peak_power_of_a_joint_is_the_most_it_drives_with_not_the_most_it_brakes
 
 
 def test_powers_of_an_exported_motion_are_negative_where_a_joint_brakes(braking, tmp_path):
-    braking.export(tmp_path / "brakes.csv", period=PERIOD, rate=400.0, length=LENGTH, mass=MASS)
-    table = pandas.read_csv(tmp_path / "brakes.csv", comment="#")
+    """Where gravity is a quarter, the same motion takes twice as long and a quarter of the torque."""
+    size = {"length": LENGTH, "mass": MASS}
+    braking.export(tmp_path / "brakes.csv", period=PERIOD, rate=400.0, **size)
+    light = {"period": 2 * PERIOD, "rate": 200.0, "gravity": 9.81 / 4}
+    braking.export(tmp_path / "light.csv", **light, **size)
+    table, less = (pandas.read_csv(tmp_path / f"{x}.csv", comment="#") for x in ("brakes", "light"))
     for joint in (1, 2):
+        torques = (each[f"joint_{joint}_N_m"] for each in (4 * less, table))
+        np.testing.assert_allclose(*torques, rtol=1e-6, atol=1e-6)
         torque, speed, power = (table[f"joint_{joint}_{u}"] for u in ("N_m", "rad_per_s", "W"))
         atol = 1e-6 * np.abs(power).max()
         np.testing.assert_allclose(power, torque * speed, rtol=1e-6, atol=atol)

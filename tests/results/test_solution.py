@@ -22,13 +22,14 @@ from tests.shared.cases import cases
 SKEW = Fourier([0.3, -0.5], [[0.4], [0.9]], [[1.1], [-0.2]])
 
 
-def test_a_turn_is_said_to_the_side_to_which_the_tail_link_turns():
+def test_a_turn_is_said_to_the_side_to_which_the_tail_link_turns_and_how_far_joints_swing():
     at = {"gait": Harmonic(1), "rotation": None, "delta": 1e-1, "mesh_tolerance": 1e-2}
     for gait in (SKEW, SKEW.mirrored):
         found = evaluate(Problem("t", **at), gait)
         before, after = found.sample(np.array([0.0, 1.0])).theta
         side = "counter-clockwise" if after > before else "clockwise"
         assert f"° {side}," in found.turning
+        np.testing.assert_allclose(found.swings, 2 * np.hypot(gait.cos, gait.sin)[:, 0], rtol=1e-4)
 
 
 def test_a_pad_is_as_fast_as_the_faster_of_its_ends(unsolved):

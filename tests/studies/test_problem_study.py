@@ -170,21 +170,21 @@ def test_what_is_found_does_not_depend_on_workers_or_on_who_is_faster(fake, tmp_
 
 
 def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypatch):
-    """Every cell has random starts of its own and its problem's guess; one start of the last cell
-    finds the good basin."""
+    """Every cell has random starts of its own, of the study's seed, and its problem's guess; one
+    start of the last cell finds the good basin."""
     numbers, rounds = [], {}
 
     def start(p, sampler, seed, k):
-        numbers.append(k)
+        numbers.append((seed, k))
         return ellipse(0.0, 1.9 if k == 23 else 1.2, 0.4)
 
     monkeypatch.setattr(study_run, "start_gait", start)
-    run = StudyRun(grid(cold_starts=2), tmp_path)
+    run = StudyRun(grid(cold_starts=2, seed=5), tmp_path)
     for progress in run.run(executor=ThreadPoolExecutor):
         best = [state.best for state in run.cells.values() if state.best is not None]
         rounds[progress.round] = sum(each.outcome.efficiency > 0.3 for each in best)
     assert rounds[0] == 1
-    assert sorted(set(numbers)) == list(range(2 * 12))
+    assert sorted(set(numbers)) == [(5, k) for k in range(2 * 12)]
     for state in run.cells.values():
         guesses = {a.key for a in state.attempts if a.origin == study_run.GUESS}
         assert start_key(state.problem.guess) in guesses

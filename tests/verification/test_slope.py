@@ -1,5 +1,7 @@
 """Gaits on a slope: against points, the level, conservation of energy, and symmetry."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq, root
@@ -187,3 +189,5 @@ def test_a_replay_on_a_slope_says_for_which_part_of_the_time_its_motion_is_open(
     for name in ("climb", "aside", "friction_work", "joint_work", "steering"):
         parts = np.append(getattr(first, name), getattr(then, name))
         np.testing.assert_allclose(getattr(both, name), parts, atol=1e-3)
+    assert both.turn == pytest.approx(first.turn + then.turn, abs=1e-3)
+    assert replace(both, steering=np.array([0.5, 1.5])).stable  # three quarters are left of both
