@@ -12,7 +12,7 @@ from colloc.mechanics.fixed_point import chain_motion
 from colloc.mechanics.solution_branches import BACKWARDS, FORWARDS, all_balanced_velocities
 from colloc.verification.adaptive_motion import fine_motion
 from tests.shared.cases import slow
-from tests.shared.mechanics import coulomb, numpy_instead
+from tests.shared.mechanics import coulomb
 
 BODY, STEEP = Chain(), Friction(mu_t=100, mu_f=1, mu_b=1)
 
@@ -226,13 +226,6 @@ def test_links_at_rest_find_at_least_what_hundreds_of_random_starts_find():
         solved = solve_balance(body, friction, angles, rates, 1e-4, start=start, tolerance=1e-12)
         apart = np.nanmin(np.abs(few.z - solved.z).max(axis=1), axis=0)
         assert (apart < solution_branches.DISTINCT)[solved.converged].all()
-
-
-def test_numpy_finds_the_same_as_the_compiled_solver():
-    compiled = all_balanced_velocities(Chain(), ONE_WAY, *PRINTED, 1e-4)
-    with numpy_instead():
-        found = all_balanced_velocities(Chain(), ONE_WAY, *PRINTED, 1e-4)
-    np.testing.assert_allclose(np.sort(found.z, axis=0), np.sort(compiled.z, axis=0), atol=1e-7)
 
 
 def test_where_no_start_at_rest_leads_to_a_balance_the_long_way_is_gone(monkeypatch):

@@ -227,13 +227,6 @@ def test_a_wheel_says_which_of_the_two_laws_it_has():
     assert Foot(0, friction=Axle(rolling=1.0)).kind == "foot"
 
 
-def test_rolling_fast_takes_nothing_from_what_holds_sideways():
-    one, slow, fast = np.ones((1, 1)), np.array([[0.1]]), np.array([[100.0]])
-    for vs in (slow, fast):
-        force = Axle(rolling=0.02, sideways=1.0).density(vs, slow, 1e-9 * one)
-        np.testing.assert_allclose(force, [-0.02 * one, -one])
-
-
 @pytest.mark.parametrize("wheel", [{"rolling": 1e-7}, {"rolling": 1.0, "sideways": 1e7}], ids=str)
 def test_wheels_that_roll_freely_or_hold_firmly_do_not_slip(wheel):
     """To rolling over sideways friction times delta, and not times the speed: it is nonholonomic at

@@ -31,19 +31,6 @@ def test_high_orders_stay_accurate(name):
     assert s.b.min() > 0
 
 
-@pytest.mark.parametrize(("name", "order"), ORDERS.items())
-def test_mesh_integrates_at_the_order_of_its_scheme(name, order):
-    s = scheme(name)
-    errors = []
-    for n in (4, 8):
-        mesh = Mesh(s, np.linspace(0.0, 2.0, n + 1))
-        _, rate = mesh.quadrature()
-        errors.append(abs((rate @ np.exp(mesh.times)).sum() - (np.exp(2.0) - 1)))
-    if errors[1] > 1e-13:
-        assert abs(np.log2(errors[0] / errors[1]) - order) < 0.3
-    assert errors[1] < 8.0 * 0.25**order
-
-
 @pytest.mark.parametrize("name", ORDERS)
 def test_site_equations_have_one_row_per_unknown_and_integrate_polynomials_exactly(name):
     s = scheme(name)

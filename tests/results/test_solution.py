@@ -45,17 +45,6 @@ def test_a_pad_is_as_fast_as_the_faster_of_its_ends(unsolved):
     np.testing.assert_allclose(speeds, ends.max(axis=0), atol=0.02 * speeds.max())
 
 
-def test_a_gait_that_is_named_from_the_other_end_travels_the_other_end_first():
-    """Each joint takes the part of its mirror image, with the opposite angle."""
-    gait = Fourier([0.0, 0.2], [[1.4], [0.9]], [[0.2], [1.1]])
-    turned = Fourier(-gait.mean[::-1], -gait.cos[::-1], -gait.sin[::-1])
-    back = Fourier(gait.mean, gait.cos, -gait.sin)
-    problem = Problem("named", gait=Harmonic(1), delta=1e-2, rotation=None)
-    one, other, reversed_ = (evaluate(problem, each).travels for each in (gait, turned, back))
-    assert {one, other} == {"head first", "tail first"}
-    assert reversed_ == other
-
-
 @pytest.mark.parametrize(
     ("mu_f", "mu_b", "first"), [(1.0, 5.0, "head first"), (5.0, 1.0, "tail first")]
 )

@@ -86,7 +86,7 @@ def test_what_does_not_balance_is_said():
 
 POINTS = 9601
 S = np.linspace(0.0, 1.0, POINTS)
-PRESCRIBED = [Wave("sine", 1.2, 1.5), Wave("standing")]
+PRESCRIBED = [Wave("sine", 1.2, 1.5), Wave("standing"), Wave("tanh", 1.3, 2.0, 4.0)]
 PRESCRIBED += [Concertina(0.2, bumps=1), Concertina(0.2, share=0.6, bumps=2)]
 BODIES = [ModalBody(4, basis, panels=12) for basis in ("legendre", "fourier")]
 BODIES += [CrawlerBody(0.2, panels=24), *PRESCRIBED]
@@ -182,7 +182,7 @@ def test_what_is_drawn_lies_on_the_curve_and_moves_as_it_does(body):
     assert_allclose(drawn, friction_on(law, velocity, along, across, delta)[:, middles], atol=0.15)
 
 
-@pytest.mark.parametrize("body", [*PRESCRIBED[2:], CrawlerBody(0.2)], ids=str)
+@pytest.mark.parametrize("body", [*PRESCRIBED[3:], CrawlerBody(0.2)], ids=str)
 def test_between_the_breaks_of_a_bump_its_curvature_does_not_jump(body):
     """Theta'' jumps by as much as six times the square of the bump's steepness; a few points from a
     break it is continuous."""

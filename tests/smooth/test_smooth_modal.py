@@ -13,8 +13,7 @@ from colloc.results.comparison import distance, reversed_in_time, swap_ends
 from colloc.search.iterate import evaluate_at, space_near
 from colloc.search.optimise import on_more_panels
 from colloc.search.solve import solve
-from colloc.smooth.balance import Motion, solve_smooth
-from colloc.smooth.smooth_body import accurate_motion
+from colloc.smooth.balance import Motion
 from colloc.transcription.shape_constraints import shape_checks
 from scripts.models.period import measured_period
 from tests.shared.stages import answer_near, program_of
@@ -66,23 +65,6 @@ def test_a_straight_staircase_is_laid_into_the_line_through_it():
     n = 40
     amplitudes = ModalBody(3).from_chain(np.full(n, 1.0 / n)) @ np.full(n - 1, 1.0 / n)
     np.testing.assert_allclose(amplitudes, [0.5, 0.0, 0.0], atol=2.0 / n**2)
-
-
-@pytest.mark.parametrize("friction", [SIDEWAYS, Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0)])
-def test_balance_and_power_agree_with_adaptive_panels(friction):
-    body = ModalBody(4, panels=24, order=8)
-    gait, t, delta = wave(body, 1.0), np.array([0.05, 0.2, 0.4]), 0.05
-    general = solve_smooth(gait_motion(body, gait), friction, t, delta).require()
-    solved = body.solve(friction, gait.angles(t), gait.rates(t), delta)
-    motion = body.motion(friction, gait.angles(t), gait.rates(t), delta, solved)
-    replayed, _ = accurate_motion(body, friction, gait.angles(t), gait.rates(t), delta, None)
-    # where parts slide backward, mu jumps within a panel
-    tolerance = 1e-6 if friction.mu_f == friction.mu_b else 1e-4
-    for other in (general, replayed):
-        np.testing.assert_allclose(motion.z, other.z, atol=tolerance)
-        np.testing.assert_allclose(motion.centre, other.centre, atol=tolerance)
-        np.testing.assert_allclose(motion.power, other.power, rtol=tolerance)
-    np.testing.assert_allclose(motion.actuator_power, motion.power, rtol=1e-9)
 
 
 @pytest.mark.parametrize("modes", [2, 4, 6, 12])

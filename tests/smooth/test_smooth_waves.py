@@ -19,7 +19,6 @@ from colloc.mechanics.fixed_point import chain_motion
 from colloc.pictures.movie import frames
 from colloc.pictures.report_page import report_page
 from colloc.reduced.program import ReducedProgram
-from colloc.results.motion import friction_arrows
 from colloc.results.solution import SOLVED
 from colloc.search.confirm import answer_of_iterate
 from colloc.search.explore import first_optimum
@@ -27,8 +26,7 @@ from colloc.search.iterate import evaluate_at, space_near
 from colloc.search.optimise import optimise
 from colloc.search.options import COARSE
 from colloc.search.solve import solve
-from colloc.smooth.balance import Motion
-from colloc.smooth.smooth_body import LAP, schedule
+from colloc.smooth.smooth_body import LAP
 from scripts.continue_epsilon import Crawler, delta_for, epsilon_point, fitted_order
 from scripts.models.period import measured_period, period
 from tests.shared.cases import slow
@@ -95,24 +93,6 @@ def test_standing_wave_does_not_travel():
     assert 0.4 < p.W < 0.5
 
 
-def test_isotropic_waves_are_ineffective():
-    """The paper's figure 6: work 0.4 to 0.5 (B: 0.505), distance below 0.005."""
-    for wave in (Wave().prescribed(), Wave("tanh", 1.3, 2.0).prescribed()):
-        p = period(wave, Friction(), 1e-4, intervals=6, quadrature_tolerance=1e-6)
-        assert 0.4 < p.W < 0.51
-        assert p.d < 0.005
-
-
-def test_the_half_period_and_the_whole_agree():
-    wave = Wave().prescribed()
-    whole = Motion(wave.angle, wave.rate, stages=(0.0, 0.5, 1.0))
-    law, finely = Friction(mu_t=10, mu_f=1, mu_b=1), {"quadrature_tolerance": 1e-8}
-    a, b = (period(m, law, 1e-3, intervals=3, **finely) for m in (wave, whole))
-    assert a.d == pytest.approx(b.d, abs=1e-8)
-    assert pytest.approx(b.W, abs=1e-8) == a.W
-    assert abs(b.rotation) < 1e-10
-
-
 BODIES = [Wave(), Wave("tanh", 1.3, 2.0), Wave("standing")]
 BODIES += [Concertina(0.2), Concertina(0.1, bumps=2)]
 
@@ -146,16 +126,6 @@ def test_it_is_read_as_it_was_written(wave, tmp_path):
     np.testing.assert_array_equal(read.sample(0.7).tail, wave.sample(0.7).tail)
     assert frames(read, count=5).ends.shape == (2, 97, 5)
     assert export([str(tmp_path / "wave.h5"), "--period", "1"]) == 2
-
-
-def test_the_friction_that_is_drawn_has_no_resultant():
-    """The body is in balance, and its arrows stand in the middles of 96 parts of its outline, which
-    show a part at stick as one arrow: the mean of so many is off by a percent."""
-    body, t = Wave(), np.linspace(0.0, 0.4, 5)
-    gait = Prescribed(schedule(body), "antipodal").member(np.empty(0), 2)
-    at = (ALONG, gait.angles(t), gait.rates(t), 1e-2)
-    _, force = friction_arrows(body, *at, body.solve(*at).z, count=96)
-    np.testing.assert_allclose(force.mean(axis=1), 0.0, atol=2e-2 * np.abs(force).max())
 
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.describe()[:24])

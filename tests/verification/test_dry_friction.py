@@ -122,13 +122,6 @@ def test_verify_tells_the_interval_on_demand(three_link, tmp_path, capsys):
     assert "dry" not in capsys.readouterr().out
 
 
-def test_where_either_foot_may_hold_the_motion_is_bounded_only_loosely():
-    """Of two single feet either may rest, or both move, with the same dissipation."""
-    found = dry_balance(Chain((0.5, 0.5), feet=1), ISOTROPIC, np.array([[0.8]]), np.array([[1.0]]))
-    assert found.most - found.least < 1e-8
-    assert found.apart.max() > 1e-2
-
-
 @pytest.mark.parametrize(
     ("lengths", "places", "rates"),
     [((1 / 3,) * 3, (0.5,) * 3, (1, 1)), ((0.2, 0.5, 0.3), (0.1, 0.2, 0.9), (0.3, 1))],
