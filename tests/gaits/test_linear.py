@@ -270,6 +270,8 @@ def test_joints_follow_one_another_by_a_lag_and_a_member_has_its_parameters(gait
     gait = space.member(v)
     angles, earlier = gait.angles(t), gait.angles(t - gait.lag / (2 * np.pi))
     np.testing.assert_allclose(angles[1:], earlier[:-1], atol=1e-13)
+    images = {"bilateral": -gait.angles(-t)[::-1], "antipodal": -gait.angles(t + 0.5)}
+    np.testing.assert_allclose(images.get(gait_class.symmetry, angles), angles, atol=1e-13)
     words = f"({5 * abs(gait.lag) / (2 * np.pi):.3f} waves along the body, towards the "
     assert words + ("head" if gait.lag > 0 else "tail") in gait.lines()[0]  # who does it later
     np.testing.assert_allclose(gait_class.parameters(gait), v, atol=1e-14)
