@@ -65,6 +65,16 @@ class Iterate:
         stationary = max(self.kkt_error, self.complementarity) < self.kkt
         return stationary and self.violation < TOLERANCES.kkt
 
+    @cached_property
+    def strays(self) -> bool:
+        """True if the body, where several velocities balance it, would not move as the search has
+        it: that goes on at each instant from the last gait, a body from the instant before."""
+        dynamics = self.space.control.dynamics
+        if dynamics.law.associated or dynamics.states:
+            return False
+        in_time = ReducedProgram(self.space, self.delta).objective(self.v)
+        return abs(in_time - self.objective) > TOLERANCES.replay_gap * abs(self.objective)
+
     def program(self) -> ReducedProgram:
         """Reduced program with its rows at the worst instants of this gait."""
         program = ReducedProgram(self.space, self.delta)

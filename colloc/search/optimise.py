@@ -271,7 +271,9 @@ def refine(iterate: Iterate) -> Iterate:
                 kkt = FINE if at_optimum or count > n_first else MEDIUM
             hessian = hessian if iterate.v.size == v.size else None
             finer = optimise(space, v, iterate.delta, kkt, hessian)
-            iterate = finer.after(iterate.history)
+            strayed, iterate = iterate.strays, finer.after(iterate.history)
+            if strayed and iterate.strays:
+                return iterate  # it would on the next mesh, too
         except NotConvergedError as error:
             # keep the unrefined gait; its certificate records the mesh error
             return replace(iterate, message=f"refinement ended, as on a finer mesh: {error}")

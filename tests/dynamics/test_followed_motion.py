@@ -1,15 +1,30 @@
 """All balanced velocities, one for equal coefficients, at some instants several for others; and the
 replay where the law leaves the motion open: branches in time, an error that covers all."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from colloc import Chain, Fourier, Friction, NotConvergedError, ellipse, replay, solve_balance
+from colloc import (
+    Chain,
+    Fourier,
+    Friction,
+    Harmonic,
+    NotConvergedError,
+    Problem,
+    ellipse,
+    replay,
+    solve_balance,
+)
 from colloc.mechanics import solution_branches
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.densities import Instants
 from colloc.mechanics.fixed_point import chain_motion
 from colloc.mechanics.solution_branches import BACKWARDS, FORWARDS, all_balanced_velocities
+from colloc.reduced.program import ReducedProgram
+from colloc.search.confirm import Solver, confirm
+from colloc.search.iterate import evaluate_at, space_near
 from colloc.verification.adaptive_motion import fine_motion
 from tests.shared.cases import slow
 from tests.shared.mechanics import coulomb
@@ -106,6 +121,29 @@ def test_the_stated_error_covers_both_directions(law, seeds):
                 known_by = known.errors[name] + other.errors[name] + known.others[name]
                 assert abs(other.values[name] - known.values[name]) <= known_by
         assert (forwards.several > 0) == (forwards.ambiguity > 0) == (seed not in (4, 8))
+
+
+def test_a_search_that_ends_off_the_motion_in_time_is_not_confirmed(monkeypatch):
+    problem = Problem(
+        "steep", body=BODY, friction=STEEP, gait=Harmonic(2, "none"), guess=random_path(5)
+    )
+    space, v = space_near(problem, problem.guess)
+    at = space, v, problem.delta
+    assert not evaluate_at(*at).strays
+    program = ReducedProgram(space, problem.delta)
+    program.place_rows(v)
+    begin = program.motion.at(v, problem.delta)
+    shapes, law = begin.shapes, program.motion.kind.law
+    instants = Instants(BODY, law, shapes.angles, shapes.rates, shapes.delta)
+    other = solution_branches.followed_motion(instants, sense=BACKWARDS)[0]
+    # as from a gait beside it, on the branch that is followed against time
+    program.motion._last = replace(begin, v=v + 1.0, z=other)
+    ended = evaluate_at(*at, program=program)
+    assert ended.strays
+    monkeypatch.setattr(Solver, "solve_within", None)
+    answer = confirm(replace(ended, violation=0.0))  # as of a search that meets its limits
+    assert not answer.optimal
+    assert "does not follow from the instants before" in answer.message
 
 
 def test_a_period_that_is_open_at_its_ends_is_followed_around_them():
