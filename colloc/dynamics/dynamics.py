@@ -459,9 +459,12 @@ class Inertial(QuasiStatic):
         """Outputs and final states of every interval from initial states ``(n_state, n)``, sought
         near states at the points; and whether they exist, ``(n,)``."""
         equations, froude = self.equations(mesh, shapes.unit), self.froude_at(shapes, along.static)
-        states, ends, found = equations.solve_intervals(
-            lambda states: self._rates(shapes, states, froude)[1], begins, near
-        )
+
+        def rates(states: np.ndarray, of: np.ndarray) -> Rates:
+            some = shapes._replace(angles=shapes.angles[:, of], rates=shapes.rates[:, of])
+            return self._rates(some, states, froude)[1]
+
+        states, ends, found = equations.solve_intervals(rates, begins, near)
         return self._rates(shapes, states, froude)[0], ends, found
 
     def _rates(self, shapes: Shapes, states: np.ndarray, froude: float) -> tuple[np.ndarray, Rates]:

@@ -142,32 +142,47 @@ class CollocatedStates:
         return -self._linear(on_states).solve(np.column_stack([-gained, edges[:, -1]]))[:, :-1]
 
     def solve_intervals(
-        self, rates: Callable[[np.ndarray], Rates], begins: np.ndarray, near: np.ndarray
+        self,
+        rates: Callable[[np.ndarray, np.ndarray], Rates],
+        begins: np.ndarray,
+        near: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """States of every interval by itself from begins ``(n_state, n)``; its ends ``(n_state,
-        n)``; convergence ``(n,)``."""
-        n, s = self._b.shape
+        n)``; convergence ``(n,)``. `rates` are those of states at points of such indices."""
+        (n, s), k = self._b.shape, len(begins)
 
-        def largest(values: np.ndarray) -> np.ndarray:
-            return np.abs(values).reshape(-1, n, s).max(axis=(0, 2))
+        def residual(
+            states: np.ndarray, of: np.ndarray
+        ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+            now = rates(states.reshape(k, -1), (s * of[:, None] + np.arange(s)).ravel())
+            value = now.value.reshape(k, -1, s)
+            gained = np.einsum("nij,anj->ani", self._a[of], value)
+            left_over = states - begins[:, of, None] - gained
+            off = np.abs(left_over).max(axis=(0, 2))
+            return value, left_over, now.on_states.reshape(k, k, -1, s), off
 
-        def residual(states: np.ndarray) -> tuple[Rates, np.ndarray, np.ndarray]:
-            now = rates(states)
-            gained = self._within(now.value.reshape(-1, n, s)).reshape(states.shape)
-            left_over = states - np.repeat(begins, s, axis=1) - gained
-            return now, left_over, largest(left_over)
-
-        (now, left_over, off), states, share = residual(near), near, np.ones(n)
+        states, share, open_ = near.reshape(k, n, s).copy(), np.ones(n), np.arange(n)
+        value, left_over, slopes, off = residual(states, open_)
         for _ in range(_MOST_ITERATIONS):
-            if (off < _CLOSED).all():
+            open_ = open_[off[open_] >= _CLOSED]
+            if not open_.size:
                 break
-            step = np.repeat(share, s) * self._linear(now.on_states).within(left_over)
-            nearer = (residual(states - step)[-1] < off) | (largest(step) < _ROUNDED)
-            states = np.where(np.repeat(nearer, s), states - step, states)
-            share = np.where(nearer, np.minimum(2.0 * share, 1.0), 0.25 * share)
-            now, left_over, off = residual(states)
-        gained = (self._b * now.value.reshape(-1, n, s)).sum(axis=2)
-        return states, begins + gained, off < _FOUND
+            matrix = _stage_matrices(self._a[open_], slopes[:, :, open_])
+            right = left_over[:, open_].transpose(1, 2, 0).reshape(-1, s * k, 1)
+            step = np.linalg.solve(matrix, right).reshape(-1, s, k).transpose(2, 0, 1)
+            step *= share[open_, None]
+            trial = residual(states[:, open_] - step, open_)
+            is_rounding = np.abs(step).max(axis=(0, 2)) < _ROUNDED
+            nearer = (trial[-1] < off[open_]) | is_rounding
+            of = open_[nearer]
+            states[:, of] -= step[:, nearer]
+            value[:, of], left_over[:, of] = trial[0][:, nearer], trial[1][:, nearer]
+            slopes[:, :, of], off[of] = trial[2][:, :, nearer], trial[3][nearer]
+            share[open_] = np.where(
+                nearer, np.minimum(2.0 * share[open_], 1.0), 0.25 * share[open_]
+            )
+            open_ = open_[~is_rounding]
+        return states.reshape(k, -1), begins + (self._b * value).sum(axis=2), off < _FOUND
 
     def _within(self, stages: np.ndarray) -> np.ndarray:
         return np.einsum("nij,anj->ani", self._a, stages)
@@ -202,6 +217,14 @@ class CollocatedStates:
         return last[1]
 
 
+def _stage_matrices(a: np.ndarray, on_states: np.ndarray) -> np.ndarray:
+    """``I - H R`` of intervals by themselves, ``(n, s k, s k)`` in order of stage, state, from ``(k,
+    k, n, s)``."""
+    k, _, n, s = on_states.shape
+    stages = np.einsum("nij,abnj->niajb", a, on_states).reshape(n, s * k, s * k)
+    return np.asarray(np.eye(s * k) - stages)
+
+
 class _Linear:
     """``I - H R``, condensed to the states at the edges: rows that close a period or say where it
     starts, and for every interval ``end - through begin``."""
@@ -217,10 +240,8 @@ class _Linear:
     ) -> None:
         (n, s), k, one = b.shape, len(free), np.eye(len(free))
         self._a, self._b, self._free, self._shape = a, b, free, (n, s, k)
-        # of an interval in order of stage, state
         slopes = on_states.reshape(k, k, n, s).transpose(2, 3, 0, 1)
-        matrix = np.eye(s * k) - np.einsum("nij,njab->niajb", a, slopes).reshape(n, s * k, s * k)
-        self._inverse = np.linalg.inv(matrix)
+        self._inverse = np.linalg.inv(_stage_matrices(a, on_states.reshape(k, k, n, s)))
         self._gain = np.einsum("nj,njab->najb", b, slopes).reshape(n, k, s * k)
         self._response = self._inverse.reshape(n, s * k, s, k).sum(axis=2)
         blocks = np.tile(one, (n + 1, 2, 1, 1))
@@ -241,14 +262,14 @@ class _Linear:
         n, s, k = self._shape
         return by_interval.reshape(-1, n, s, k).transpose(0, 3, 1, 2).reshape(-1, k, n * s)
 
-    def within(self, right: np.ndarray) -> np.ndarray:
+    def _within(self, right: np.ndarray) -> np.ndarray:
         """Solution ``(k, n_point)`` of every interval by itself, from a begin of 0."""
         return self._by_point(np.einsum("nij,mnj->mni", self._inverse, self._by_interval(right)))[0]
 
     @_FAR
     def solve(self, residual: np.ndarray) -> np.ndarray:
         """Solution at the points and at the begin, ``(k, n_point + 1)``."""
-        own, k = self.within(residual[:, :-1]), len(residual)
+        own, k = self._within(residual[:, :-1]), len(residual)
         gained = np.einsum("nai,mni->na", self._gain, self._by_interval(own))
         right = np.append(np.where(self._free, residual[:, -1], 0.0), gained)
         edges = self._edges.solve(right).reshape(-1, k)

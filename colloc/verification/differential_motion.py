@@ -24,7 +24,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,10 +50,6 @@ from colloc.verification.adaptive_motion import (
     to_tolerance,
 )
 
-if TYPE_CHECKING:
-    from scipy.integrate import OdeSolution
-
-
 STEP = 1 / 100
 """Local error over that of a run. Stick and slip make kinks, which methods of long steps skip
 (Runge and Kutta's left 1e-5 at 1e-7 a step); Adams' errs by 8 to 40 times a step."""
@@ -69,12 +65,83 @@ _ONE_AT_A_TIME = threading.RLock()
 class _TooOften(Exception): ...
 
 
+class _Interpolant:
+    """States at phases, ``(n_state, n)``: the polynomials of a solver's steps, all at once."""
+
+    def __init__(self, ends: list[float], pieces: list[Any]) -> None:
+        # LSODA's begin at the end of a step, Radau's at its begin
+        of_step = [
+            (each.t_old, np.column_stack([each.y_old, each.Q]))
+            if hasattr(each, "Q")
+            else (each.t, each.yh)
+            for each in pieces
+        ]
+        self._ends, self._length = np.array(ends), np.array([each.h for each in pieces])
+        self._origin = np.array([origin for origin, _ in of_step])
+        terms = max(each.shape[1] for _, each in of_step)
+        self._coefficients = np.zeros((terms, len(pieces), len(of_step[0][1])))
+        for k, (_, each) in enumerate(of_step):
+            self._coefficients[: each.shape[1], k] = each.T
+
+    def __call__(self, t: np.ndarray) -> np.ndarray:
+        step = np.clip(np.searchsorted(self._ends, t) - 1, 0, self._length.size - 1)
+        x = ((t - self._origin[step]) / self._length[step])[:, None]
+        value = self._coefficients[-1, step]
+        for each in self._coefficients[-2::-1]:
+            value = value * x + each[step]
+        return np.asarray(value.T)
+
+
 class Course(NamedTuple):
     phases: np.ndarray
     """Steps of the solver, ``(n,)``."""
     states: np.ndarray
-    at: OdeSolution
+    at: Callable[[np.ndarray], np.ndarray]
     """States at phases, ``(n_state, n_time)``."""
+
+
+class _Integrals:
+    """Integrals from phase 0 of densities ``(k, n)`` at phases, by Gauss quadrature on panels that
+    are halved where that changes more than an error, as at kinks of a power."""
+
+    def __init__(
+        self, densities: Callable[[np.ndarray], np.ndarray], edges: np.ndarray, error: float
+    ) -> None:
+        self._densities = densities
+        left, right = edges[:-1], edges[1:]
+        whole, lefts, gained = self._gained(left, right), list[np.ndarray](), list[np.ndarray]()
+        while left.size:
+            middle = 0.5 * (left + right)
+            each = np.column_stack([left, middle]).ravel(), np.column_stack([middle, right]).ravel()
+            parts = self._gained(*each)
+            both = parts[:, ::2] + parts[:, 1::2]
+            changed = np.abs(both - whole).max(axis=0, initial=0.0)
+            off = changed > error * np.maximum(right - left, _KINK)
+            off &= right - left > 2 * _NARROWEST
+            lefts.append(left[~off])
+            gained.append(both[:, ~off])
+            again = np.repeat(off, 2)
+            (left, right), whole = (edge[again] for edge in each), parts[:, again]
+        begin = np.concatenate(lefts)
+        order = np.argsort(begin)
+        self._begin = begin[order]
+        self._before = np.cumsum(np.pad(np.hstack(gained)[:, order], ((0, 0), (1, 0))), axis=1)
+
+    def _gained(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        t = (left[:, None] + (right - left)[:, None] * PANEL_RULE.c).ravel()
+        densities = self._densities(t)
+        stages = densities.reshape(len(densities), left.size, PANEL_RULE.c.size)
+        return np.asarray((right - left) * (stages @ PANEL_RULE.b))
+
+    @property
+    def whole(self) -> np.ndarray:
+        """Up to the last edge, ``(k,)``."""
+        return self._before[:, -1]
+
+    def __call__(self, ends: np.ndarray) -> np.ndarray:
+        """Up to phases, ``(k, n)``."""
+        panel = np.searchsorted(self._begin, ends, side="right") - 1
+        return self._before[:, panel] + self._gained(self._begin[panel], ends)
 
 
 def integrate_period(
@@ -94,7 +161,7 @@ def integrate_period(
     phases in (0, 1), ascending, at which the rates jump. jacobian: derivatives of the rates
     ``(n_state, n_state)`` at a phase; by default from differences, one evaluation a state.
     """
-    from scipy.integrate import OdeSolution, solve_ivp
+    from scipy.integrate import solve_ivp
 
     near: Any = None
     first = last = left = 0.0
@@ -138,7 +205,7 @@ def integrate_period(
         states.append(run.y)
         ends.extend(run.sol.ts[1:])
         pieces.extend(run.sol.interpolants)
-    at = OdeSolution(ends, pieces)
+    at = _Interpolant(ends, pieces)
     return Course(np.concatenate(phases), np.concatenate(states, axis=1), at)
 
 
@@ -164,7 +231,6 @@ _KINK, _NARROWEST = 1e-3, 1e-9
 """Least part of the cycle that a panel's error is held against, as kinks are few; least width."""
 _TOGETHER = 4
 """Steps of a run in a panel: they are a few times shorter than quadrature of this order needs."""
-_END = np.ones(1)
 _MOMENTA, _THETA, _PLACE, _WORK = slice(0, 3), 3, slice(4, 6), 6
 _Breaks = np.ndarray | tuple[float, ...]
 
@@ -197,36 +263,17 @@ class _Gait:
         """Instants at phases where the motion has the states ``(n_state, n)``."""
         raise NotImplementedError
 
-    def sums(self, ran: Course, aim: float, ends: np.ndarray = _END, motion: int = 0) -> np.ndarray:
-        """Quantities that need forces up to ascending phases, ``(k, n)``, by Gauss quadrature over
-        a few steps of a run at a time, halved where that changes more than an error, as at kinks of
-        a power."""
-        sums = np.zeros((len(self.quantities), ends.size + 1))
-        if not self.quantities:
-            return sums[:, 1:]
+    def integrals(self, ran: Course, error: float, motion: int = 0) -> _Integrals:
+        """Of quantities that need forces, along one of the motions of a run."""
 
-        def gained(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-            t = (left[:, None] + (right - left)[:, None] * PANEL_RULE.c).ravel()
+        def densities(t: np.ndarray) -> np.ndarray:
+            if not self.quantities:
+                return np.empty((0, t.size))
             now = self.instants(t, ran.at(t)[7 * motion :])
-            densities = np.stack([each.at(now).reshape(left.size, -1) for each in self.quantities])
-            return np.asarray((right - left) * (densities @ PANEL_RULE.b))
+            return np.stack([each.at(now)[0] for each in self.quantities])
 
-        edges = np.union1d(np.union1d(ran.phases[::_TOGETHER], ends), 0.0)
-        left, right = edges[:-1], edges[1:]
-        whole = gained(left, right)
-        while left.size:
-            middle = 0.5 * (left + right)
-            each = np.column_stack([left, middle]).ravel(), np.column_stack([middle, right]).ravel()
-            parts = gained(*each)
-            both = parts[:, ::2] + parts[:, 1::2]
-            off = np.abs(both - whole).max(axis=0) > aim * np.maximum(right - left, _KINK)
-            off &= right - left > 2 * _NARROWEST
-            upto = np.searchsorted(ends, left, side="right")
-            for row, part in zip(sums, both, strict=True):
-                np.add.at(row, upto[~off], part[~off])
-            again = np.repeat(off, 2)
-            (left, right), whole = (edge[again] for edge in each), parts[:, again]
-        return np.cumsum(sums, axis=1)[:, :-1]
+        edges = np.union1d(ran.phases[::_TOGETHER], [0.0, 1.0])
+        return _Integrals(densities, edges, error)
 
     def measured(
         self, ran: Course, z: np.ndarray, values: Numbers, errors: Numbers, objective: Objective,
@@ -351,7 +398,7 @@ class GaitOnSlope(_Gait):
             way = self.slope.travel_along(complex(climb, aside))
             work = spent + self.slope.grade * climb
             numbers = {"distance": way.real, "work": work, "rotation": theta}
-            sums = zip(self.quantities, self.sums(ran, aim)[:, 0].tolist(), strict=True)
+            sums = zip(self.quantities, self.integrals(ran, aim).whole.tolist(), strict=True)
             return (ran, way.imag), numbers | {each.name: total for each, total in sums}
 
         first = _FIRST * tolerance
@@ -578,7 +625,7 @@ class GaitWithInertia(_Gait):
             step = _newton_step(first - start, np.subtract(others, first).T / _APART)
             start = start + step
             if np.abs(step).max() < _LEFT_OPEN * self._rough:
-                sums = [self.sums(ran, self._rough, motion=k)[:, 0] for k in range(len(begin))]
+                sums = [self.integrals(ran, self._rough, k).whole for k in range(len(begin))]
                 end = np.column_stack([end, sums])
                 before = np.pad(begin[0], (0, len(self.quantities)))
                 slopes = (end[1:] - end[0]).T / _APART
@@ -604,7 +651,7 @@ class GaitWithInertia(_Gait):
             step = _newton_step(gap, slopes)
             start, size = start + step, np.abs(step).max()
             if size < aim or (before <= size and np.abs(gap).max() < _LEFT_OPEN * aim):
-                return PeriodicRun(course, start, aim, self.sums(course, aim)[:, 0])
+                return PeriodicRun(course, start, aim, self.integrals(course, aim).whole)
             before = size
         raise self._not_alike()
 
@@ -674,7 +721,7 @@ class GaitWithInertia(_Gait):
         others: Numbers = {}
         if several:
             other = self.run(from_rest, tolerance)
-            sums = self.sums(other, tolerance)[:, 0]
+            sums = self.integrals(other, tolerance).whole
             there = self.totals(PeriodicRun(other, from_rest, tolerance, sums).ends)
             others = {name: abs(value - values[name]) for name, value in there.items()}
         shapes = self.body, *self.path(phases % 1.0)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -143,12 +142,12 @@ def gait_motion(
         times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
         run = moving.periodic_run(begin, max(error / times, LEAST), slopes)
         by_interval = kind.solve_intervals  # type: ignore[attr-defined]
-        sums = partial(moving.sums, run.course, run.aim)
+        sums = moving.integrals(run.course, run.aim)
         return ReferenceMotion(run.course.at, times * run.aim, sums, by_interval)
     if regime.slides:
         on = GaitOnSlope(body, law, gait, delta, regime, gait.corner_phases, asked)
         ran = on.integrate(gait.theta, error)
-        return ReferenceMotion(lambda t: ran.at(t)[:4], error, partial(on.sums, ran, error))
+        return ReferenceMotion(lambda t: ran.at(t)[:4], error, on.integrals(ran, error))
     raise NotImplementedError(
         f"no differential equation is known for {type(regime).__name__}: give it a reference."
     )
