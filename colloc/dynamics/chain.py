@@ -1,14 +1,10 @@
 r"""A chain under its weight on a slope, and with inertia: balance, rates of the momenta
 (`colloc.mechanics.inertia`) and joint torques, with derivatives.
 
-With the kinetic energy T(q, r, z) of a body of mass 1 that moves with joint angles q, rates r and
-tail velocity z, the equation of joint j is
-
-    Fr (d/dt dT/dr_j - dT/dq_j) = M_j - (virtual power of friction, the tail resting).
-
-A uniform pull, as that of a slope, accelerates all links alike and takes no torque. Replays take
-the accelerations of the links by differences in time, programs by derivatives of z(q, r, momenta);
-the two share no formula.
+A joint bears the moment about it of friction on all links ahead, less that of mass times
+acceleration. A uniform pull, as that of a slope, accelerates all links alike and takes no torque.
+Replays take accelerations by differences in time, and moments by virtual power; programs add up
+forces from link to link (Newton and Euler); the two share no formula.
 """
 
 from __future__ import annotations
@@ -19,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colloc.gaits.regime import Regime
-from colloc.mechanics.balance import Moving, joint_moments
+from colloc.mechanics.balance import TAIL, Moving, joint_moments
 from colloc.mechanics.bodies import BalancedMotion, BalanceSolution
 from colloc.mechanics.chain import Chain
 from colloc.mechanics.densities import Instants, PathLimits, Quantity
@@ -29,7 +25,6 @@ from colloc.mechanics.inertia import (
     STATES,
     Path,
     inertial_moments,
-    kinetic_energy,
     momentum_rates,
     tail_velocity,
 )
@@ -175,16 +170,33 @@ def torque_function(body: Chain, friction: Law) -> Any:
     n = body.n_joint
     sizes = (("q", n), ("r", n), ("a", n), ("momenta", len(STATES)), ("delta", 1), ("froude", 1))
     q, r, accelerations, momenta, delta, froude = symbols = [ca.SX.sym(*each) for each in sizes]
-    z = tail_velocity(body, q, r, momenta)
-    changes = momentum_rates(body, friction, q, r, momenta, delta=delta, froude=froude).rates
-    z_rate = ca.jtimes(z, ca.vertcat(q, r, momenta), ca.vertcat(r, accelerations, changes))
-    tail, tail_rate = ca.SX.sym("z", 3), ca.SX.sym("z_rate", 3)
-    energy = kinetic_energy(body, q, r, tail)
-    way = ca.vertcat(q, r, tail), ca.vertcat(r, accelerations, tail_rate)
-    inertia = ca.jtimes(ca.gradient(energy, r), *way) - ca.gradient(energy, q)
-    inertia = ca.substitute(inertia, ca.vertcat(tail, tail_rate), ca.vertcat(z, z_rate))
-    forces = body.forces(friction, q, r, z, delta)
-    torques = joint_moments(body, q, forces) + froude * inertia
+    posture, z = body.posture(q), tail_velocity(body, q, r, momenta)
+    sliding = body.contact.on_links(body.forces(friction, q, r, z, delta))
+    (cos, sin, x, y), mass, spin = posture, body.mass_column(), body.inertia_column()
+    fx = sliding.tangential * cos - sliding.normal * sin
+    fy = sliding.tangential * sin + sliding.normal * cos
+    # accelerations of midpoints, the tail's end resting and its rate even
+    rate, turn = z[2] + body.tangent_angles(r), body.tangent_angles(accelerations)
+    path = ca.sparsify(ca.DM(body.weighted_path(TAIL)))
+    ax, ay = path @ (-sin * turn - cos * rate**2), path @ (cos * turn - sin * rate**2)
+    x, y, ax, ay = (
+        each - ca.dot(mass, each) for each in (x, y, ax, ay)
+    )  # about the centre of mass
+    moment = ca.sum1(x * fy - y * fx + sliding.couple)
+    gained = froude * ca.sum1(mass * (x * ay - y * ax) + spin * turn)
+    alpha = (moment - gained) / ca.sum1(mass * (x**2 + y**2) + spin)  # times the Froude number
+    about_midpoint = sliding.couple - spin * (alpha + froude * turn)
+    fx, fy = (
+        fx - mass * (ca.sum1(fx) + froude * ax - alpha * y),
+        fy - mass * (ca.sum1(fy) + froude * ay + alpha * x),
+    )
+    torques, ahead = [], ca.SX(3, 1)  # force, and moment about the joint, of all links ahead
+    for i in range(n, 0, -1):
+        half = 0.5 * body.lengths[i] * ca.vertcat(cos[i], sin[i])
+        about_joint = half[0] * (fy[i] + 2 * ahead[1]) - half[1] * (fx[i] + 2 * ahead[0])
+        ahead += ca.vertcat(fx[i], fy[i], about_joint + about_midpoint[i])
+        torques.insert(0, -ahead[2])
+    torques = ca.vertcat(*torques)
     return ca.Function("torques", symbols, [torques], {"cse": True})
 
 

@@ -218,8 +218,8 @@ class CollocatedStates:
 
 
 def _stage_matrices(a: np.ndarray, on_states: np.ndarray) -> np.ndarray:
-    """``I - H R`` of intervals by themselves, ``(n, s k, s k)`` in order of stage, state, from ``(k,
-    k, n, s)``."""
+    """``I - H R`` of intervals by themselves, ``(n, s k, s k)`` in order of stage, state, from
+    ``(k, k, n, s)``."""
     k, _, n, s = on_states.shape
     stages = np.einsum("nij,abnj->niajb", a, on_states).reshape(n, s * k, s * k)
     return np.asarray(np.eye(s * k) - stages)

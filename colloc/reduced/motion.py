@@ -213,7 +213,8 @@ class ReducedMotion:
         at_points = np.zeros((n_row, slopes.shape[1], n_point))
         at_points[np.arange(n_row), :, point] = slopes[share, :, np.arange(n_row)]
         if inertial:
-            return self._through_torques(s, at_points)
+            totals, on_points, *more = self._along_torque_arguments(s, at_points)
+            return self._through(s, totals, on_points, np.zeros((n_row, 1)), *more)
         no_pace = np.zeros((n_row, n_point))
         if not at_points[:, -1].any():
             return self._space.vjp(v, at_points[:, :-1].transpose(0, 2, 1), no_pace)
@@ -231,9 +232,11 @@ class ReducedMotion:
             return np.asarray(found[0](self._torque_arguments(s, t), s.delta).full())
         return np.asarray(formula.at(self._instants(s)))
 
-    def _through_torques(self, s: _State, at_points: np.ndarray) -> np.ndarray:
-        """Derivatives ``(m, n)`` of numbers that depend on `_torque_arguments` at the points, ``(m,
-        n_argument, n_point)``."""
+    def _along_torque_arguments(
+        self, s: _State, at_points: np.ndarray
+    ) -> tuple[list[TotalGradient], np.ndarray, np.ndarray, np.ndarray]:
+        """Derivatives of m numbers along the static parameter, (angles, rates, orientation), states
+        and accelerations, from those along `_torque_arguments` ``(m, n_argument, n_point)``."""
         kind: Any = self.kind
         m, n = len(at_points), len(s.shapes.angles)
         on_shape, on_accelerations, on_states, on_froude = np.split(
@@ -247,8 +250,7 @@ class ReducedMotion:
             on_log_period = -2.0 * froude * on_froude.sum(axis=(1, 2))
             totals = [TotalGradient(static=value) for value in on_log_period]
         on_points = np.pad(on_shape, ((0, 0), (0, 1), (0, 0)))
-        through = self._through(s, totals, on_points, np.zeros((m, 1)), by_states)
-        return through + self._space.accelerations_vjp(s.v, on_accelerations)
+        return totals, on_points, by_states, on_accelerations
 
     def _places(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Intervals of times of the mesh, and fractions of them."""
@@ -280,21 +282,23 @@ class ReducedMotion:
         """Derivatives of `values`, ``(n,)`` each."""
         s, kind = self.at(v, delta), self.kind
         totals, weight, pace = kind.total_gradients(s.passed), self._point_weight, s.shapes.pace
-        integrals = [each for each in self._integrals if not self._of_torques(each)]
-        gradients = [*totals.values(), *[TotalGradient()] * len(integrals)]
-        on_points = np.zeros((len(gradients), 2 * len(s.shapes.rates) + 1, weight.size))
-        on_pace = np.zeros((len(gradients), weight.size))
-        for row, quantity in enumerate(integrals, len(totals)):
-            now = self._instants(s)
-            on_points[row] = kind.periods * weight * pace * density_slopes(quantity, now)[0]
-            on_pace[row] = kind.periods * weight * quantity.at(now)[0]
-        rows = self._through(s, gradients, on_points, on_pace)
-        found = dict(zip((*totals, *(each.name for each in integrals)), rows, strict=True))
-        for each in self._integrals:
-            if each.name not in found:
-                slopes = self._of_torques(each)[1](self._torque_arguments(s), delta).full()
-                found[each.name] = self._through_torques(s, kind.periods * weight * slopes[None])[0]
-        return found
+        gradients = [*totals.values(), *[TotalGradient()] * len(self._integrals)]
+        m, n_joint, n_point = len(gradients), len(s.shapes.rates), weight.size
+        on_points, on_pace = np.zeros((m, 2 * n_joint + 1, n_point)), np.zeros((m, n_point))
+        by_states = np.zeros((m, len(kind.states), n_point))
+        on_accelerations = np.zeros((m, n_joint, n_point))
+        for row, quantity in enumerate(self._integrals, len(totals)):
+            if inertial := self._of_torques(quantity):
+                slopes = inertial[1](self._torque_arguments(s), delta).full()
+                along = self._along_torque_arguments(s, kind.periods * weight * slopes[None])
+                (gradients[row],), on_points[row], by_states[row], on_accelerations[row] = along
+            else:
+                now = self._instants(s)
+                on_points[row] = kind.periods * weight * pace * density_slopes(quantity, now)[0]
+                on_pace[row] = kind.periods * weight * quantity.at(now)[0]
+        rows = self._through(s, gradients, on_points, on_pace, by_states, on_accelerations)
+        names = *totals, *(each.name for each in self._integrals)
+        return dict(zip(names, rows, strict=True))
 
     def _through(
         self,
@@ -303,9 +307,11 @@ class ReducedMotion:
         on_points: np.ndarray,
         on_pace: np.ndarray,
         by_states: np.ndarray | float = 0.0,
+        on_accelerations: np.ndarray | None = None,
     ) -> np.ndarray:
         """Derivatives ``(m, n)`` of numbers that depend on totals of the period, on (angles, rates,
-        orientation) at the points, ``(m, 2 n_joint + 1, n_point)``, and on the pace."""
+        orientation) at the points, ``(m, 2 n_joint + 1, n_point)``, the pace, states and
+        accelerations."""
         mesh, kind, pace, compiled = self.mesh, self.kind, s.shapes.pace, self._compiled
         self._differentiated = s
         if compiled is not None and compiled.covers(s.shapes):
@@ -328,6 +334,8 @@ class ReducedMotion:
         if self._n_static:
             found[:, -self._n_static :] += on_begin
             found[:, -self._n_static] += [each.static for each in gradients]
+        if on_accelerations is not None and on_accelerations.any():
+            found += self._space.accelerations_vjp(s.v, on_accelerations)
         return found
 
 

@@ -4,12 +4,14 @@ A start is optimised on a coarse mesh down to a delta at which friction is nearl
 meets a gait that an earlier start met at the same delta, it is dropped: it would go on as that one
 did. Every sixteen starts take turns with as many hops from the best gait so far (basin hopping:
 Wales and Doye, J. Phys. Chem. A 101, 1997). Beside them are a few small loops
-(`small_loops`), slow and so optimised at a smaller delta only.
+(`small_loops`), slow and so optimised at a smaller delta only. With inertia the optima of slow
+motion come first, which take a hundredth of the time, and hops from the best of them.
 """
 
 from __future__ import annotations
 
 import itertools
+import re
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -31,6 +33,7 @@ from colloc.bounds.motions import (
 from colloc.gaits.bspline import Corners
 from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.harmonic import Fourier, ellipse
+from colloc.gaits.objective import Objective
 from colloc.gaits.problem import Problem
 from colloc.gaits.robot import widest
 from colloc.gaits.starts import (
@@ -57,7 +60,7 @@ from colloc.search.optimise import (
     regularisation_dominated,
 )
 from colloc.search.options import COARSE, FINE, MEDIUM, OPTIONS
-from colloc.system.errors import CollocError, NotConvergedError
+from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 
 
 @dataclass(eq=False)
@@ -111,7 +114,8 @@ def first_optimum(problem: Problem, gait: AnyGait) -> Iterate:
 
 def explore(problem: Problem, starts: int | None = None) -> Exploration:
     """The best gaits of a problem's class that so many starts, and at most three times as many,
-    lead to: by default 32, with inertia 96, or fewer then once some of them have met the best one.
+    lead to: by default 32; with inertia 24 beside the optima of slow motion, 96 where there are
+    none, or fewer once some of them have met the best one.
 
     Where they shrink until nobody sees them move, the search begins anew among gaits at least as
     large as the best optimum of finite size; without one, as large as the default guess is, or as
@@ -207,6 +211,32 @@ def starting_gaits(problem: Problem) -> Iterator[AnyGait]:
     return itertools.chain(itertools.chain.from_iterable(zip(first, seeds, strict=False)), seeds)
 
 
+def in_slow_motion(problem: Problem) -> Problem | None:
+    """A problem of inertia without it, with the work against friction for that of the motors, and
+    without limits of what they bear; None if there is no such problem."""
+    if not problem.regime.froude or problem.regime.free or problem.motion or problem.grade:
+        return None
+
+    def without_motors(aim: Objective) -> Objective:
+        return Objective(re.sub(r"\bdriven_work\b", "work", aim.expression), "", aim.quantities)
+
+    weak = {"torque_limit": None, "power_limit": None, "limits": ()}
+    aims = [(without_motors(aim), least) for aim, least in problem.at_least]
+    objective, stated = without_motors(problem.objective), problem.without_robot
+    with suppress(ProblemError):
+        return stated.with_(froude=0.0, objective=objective, at_least=aims, **weak)
+    return None
+
+
+def slow_optima(problem: Problem) -> list[AnyGait]:
+    """Gaits that are best in slow motion, of a problem with inertia, the best first."""
+    if (slow := in_slow_motion(problem)) is None:
+        return []
+    candidates, _ = multistart(slow, None)
+    active_run().begin_again()
+    return [each.iterate.gait for each in candidates]
+
+
 def same_gait(problem: Problem, a: Iterate, b: Iterate) -> bool:
     """True if two gaits are one, modulo start phase and the symmetries of body and friction."""
     if abs(a.objective - b.objective) > SAME_VALUE * max(abs(a.objective), abs(b.objective)):
@@ -217,8 +247,10 @@ def same_gait(problem: Problem, a: Iterate, b: Iterate) -> bool:
 
 def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], int]:
     """Candidates on a coarse mesh, best first, and the number of starts, at least one."""
+    slow = slow_optima(problem)
     run, ahead = active_run(), active_run().ahead
-    count = starts or OPTIONS.starts * (OPTIONS.max_starts if problem.regime.froude else 1)
+    usual_count = OPTIONS.starts * (OPTIONS.max_starts if problem.regime.froude else 1)
+    count = starts or (OPTIONS.starts - OPTIONS.patience if slow else usual_count)
     most = OPTIONS.max_starts * count
     coarse = problem.with_(intervals=min(problem.intervals, problem.usual_intervals // 2))
     # gaits are compared where friction is nearly dry
@@ -246,8 +278,14 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
             objective = dry_program.objective(candidate.iterate.v)
             candidate.dry_objective = float(np.nan_to_num(objective, nan=np.inf))
 
+    for gait in slow:
+        run.report("explore", 0, count, _best([c.iterate for c in last]))
+        with suppress(CollocError):
+            sketch(coarse, gait, False, deltas, levels)
+    measure(last)
+
     def is_turn_of_new(start: int) -> bool:
-        return start // (OPTIONS.starts // 2) % 2 == 0
+        return start // (OPTIONS.starts // 2) % 2 == bool(slow)
 
     def start_gait(start: int, number: int) -> tuple[AnyGait | None, bool]:
         """The gait of a start, if there is one, and whether it is new: the one of that number. It
