@@ -190,7 +190,8 @@ def torque_function(body: Chain, friction: Law) -> Any:
         fx - mass * (ca.sum1(fx) + froude * ax - alpha * y),
         fy - mass * (ca.sum1(fy) + froude * ay + alpha * x),
     )
-    torques, ahead = [], ca.SX(3, 1)  # force, and moment about the joint, of all links ahead
+    torques: list[Any] = []
+    ahead = ca.SX(3, 1)  # force, and moment about the joint, of all links ahead
     for i in range(n, 0, -1):
         half = 0.5 * body.lengths[i] * ca.vertcat(cos[i], sin[i])
         about_joint = half[0] * (fy[i] + 2 * ahead[1]) - half[1] * (fx[i] + 2 * ahead[0])
