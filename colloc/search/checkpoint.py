@@ -161,6 +161,8 @@ class Run:
         def may_be_the_answer(iterate: Iterate) -> bool:
             return iterate.problem.shrinking or is_visible(iterate.gait)
 
+        if best is not None and self.problem and best.problem.froude != self.problem.froude:
+            best = None  # a gait of slow motion, of a search that goes on with inertia
         if best is not None and (
             self.best is None
             or best.delta < self.best.delta

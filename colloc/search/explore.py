@@ -233,7 +233,6 @@ def slow_optima(problem: Problem) -> list[AnyGait]:
     if (slow := in_slow_motion(problem)) is None:
         return []
     candidates, _ = multistart(slow, None)
-    active_run().begin_again()
     return [each.iterate.gait for each in candidates]
 
 
@@ -278,8 +277,8 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
             objective = dry_program.objective(candidate.iterate.v)
             candidate.dry_objective = float(np.nan_to_num(objective, nan=np.inf))
 
-    for gait in slow:
-        run.report("explore", 0, count, _best([c.iterate for c in last]))
+    for done, gait in enumerate(slow):
+        run.report("explore", done, len(slow) + count, _best([c.iterate for c in last]))
         with suppress(CollocError):
             sketch(coarse, gait, False, deltas, levels)
     measure(last)
@@ -331,7 +330,8 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
         tried += 1
         # as a rule loops shrink further on their way down
         shown = [*last, *loops] if problem.shrinking else last
-        run.report("explore", tried, max(tried, count), _best([c.iterate for c in shown]))
+        done, all_starts = len(slow) + tried, len(slow) + max(tried, count)
+        run.report("explore", done, all_starts, _best([c.iterate for c in shown]))
 
     measure(loops)
     for candidate in loops:

@@ -155,11 +155,14 @@ def test_the_search_ends_once_starts_met_the_best_often(
 
 def test_with_a_little_inertia_one_start_leads_to_what_many_lead_to_in_slow_motion():
     gaits = Problem("same", body=Chain((0.4, 0.2, 0.25, 0.15)), gait=Harmonic(2, "none"))
-    slow, fast = (
-        min(each.dry_objective for each in multistart(problem, starts)[0] if not each.is_loop)
-        for problem, starts in ((gaits, 32), (gaits.with_(froude=1e-4), 1))
-    )
+    inertial, shown = gaits.with_(froude=1e-4), []
+    with Run(problem=inertial, progress=shown.append).active(np.inf):
+        slow, fast = (
+            min(each.dry_objective for each in multistart(problem, starts)[0] if not each.is_loop)
+            for problem, starts in ((gaits, 32), (inertial, 1))
+        )
     assert fast < 0.99 * slow
+    assert {each.best.problem.froude for each in shown if each.best} == {1e-4}
 
 
 @pytest.mark.parametrize(
