@@ -114,8 +114,8 @@ def first_optimum(problem: Problem, gait: AnyGait) -> Iterate:
 
 def explore(problem: Problem, starts: int | None = None) -> Exploration:
     """The best gaits of a problem's class that so many starts, and at most three times as many,
-    lead to: by default 32; with inertia 24 beside the optima of slow motion, 96 where there are
-    none, or fewer once some of them have met the best one.
+    lead to: by default 32, with inertia 96 where no optima of slow motion are known, or fewer once
+    some of them have met the best one.
 
     Where they shrink until nobody sees them move, the search begins anew among gaits at least as
     large as the best optimum of finite size; without one, as large as the default guess is, or as
@@ -248,8 +248,8 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
     """Candidates on a coarse mesh, best first, and the number of starts, at least one."""
     slow = slow_optima(problem)
     run, ahead = active_run(), active_run().ahead
-    usual_count = OPTIONS.starts * (OPTIONS.max_starts if problem.regime.froude else 1)
-    count = starts or (OPTIONS.starts - OPTIONS.patience if slow else usual_count)
+    many = problem.regime.froude and not slow
+    count = starts or OPTIONS.starts * (OPTIONS.max_starts if many else 1)
     most = OPTIONS.max_starts * count
     coarse = problem.with_(intervals=min(problem.intervals, problem.usual_intervals // 2))
     # gaits are compared where friction is nearly dry
