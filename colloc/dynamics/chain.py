@@ -179,9 +179,8 @@ def torque_function(body: Chain, friction: Law) -> Any:
     rate, turn = z[2] + body.tangent_angles(r), body.tangent_angles(accelerations)
     path = ca.sparsify(ca.DM(body.weighted_path(TAIL)))
     ax, ay = path @ (-sin * turn - cos * rate**2), path @ (cos * turn - sin * rate**2)
-    x, y, ax, ay = (
-        each - ca.dot(mass, each) for each in (x, y, ax, ay)
-    )  # about the centre of mass
+    # seen from the centre of mass
+    x, y, ax, ay = (each - ca.dot(mass, each) for each in (x, y, ax, ay))
     moment = ca.sum1(x * fy - y * fx + sliding.couple)
     gained = froude * ca.sum1(mass * (x * ay - y * ax) + spin * turn)
     alpha = (moment - gained) / ca.sum1(mass * (x**2 + y**2) + spin)  # times the Froude number
