@@ -264,3 +264,16 @@ def test_jacobian_of_the_states_is_the_derivative_of_their_rates(grade):
     step = [moving.rates(0.3, states + s) - moving.rates(0.3, states - s) for s in h * np.eye(14)]
     found = moving.jacobian(0.3, states)
     np.testing.assert_allclose(found, np.transpose(step) / (2 * h), atol=1e-7)
+
+
+@pytest.mark.parametrize("method", ["LSODA", "Radau"])
+def test_between_the_steps_of_a_run_states_follow_their_equation(monkeypatch, method):
+    monkeypatch.setattr("colloc.verification.differential_motion._METHODS", ((method, np.inf),))
+    gait, floor = colloc.ellipse(A0=0.3, A1=1.0, B1=0.5), colloc.Friction(mu_t=2)
+    moving = GaitWithInertia(colloc.Chain(), floor, gait, 0.1, froude=0.1)
+    ran = moving.run(np.zeros(3), 1e-3)
+    middle = 0.5 * (ran.phases[1:] + ran.phases[:-1])
+    rates = (ran.at(middle + 1e-6) - ran.at(middle - 1e-6)) / 2e-6
+    exact = [moving.rates(*at) for at in zip(middle, ran.at(middle).T, strict=True)]
+    np.testing.assert_allclose(rates.T, exact, atol=1e-2)
+    np.testing.assert_allclose(ran.at(ran.phases), ran.states, atol=1e-9)
