@@ -131,7 +131,8 @@ def run_tasks(
     executor: Callable[[int], Executor] = process_pool,
     ahead: int = 0,
 ) -> Iterator[tuple[Task, Any]]:
-    """Yield tasks with their results ``function(*task.arguments)``, each as soon as it is there.
+    """Yield tasks with their results ``function(*task.arguments)``, each as soon as it is there,
+    those that are there at once in the order in which they were begun.
 
     `ready` returns the next task, or None if there is none now; it is called again after each
     result, and the run ends when nothing is under way. `ahead` tasks wait for a worker. A task that
@@ -167,7 +168,7 @@ def run_tasks(
                         break
                     with interruptible():
                         done = wait(pending, timeout=_MOMENT, return_when=FIRST_COMPLETED).done
-                    for future in done:
+                    for future in [each for each in pending if each in done]:  # in their order
                         error = CancelledError() if future.cancelled() else future.exception()
                         if isinstance(error, BrokenExecutor):
                             raise error

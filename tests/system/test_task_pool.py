@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from colloc.system.task_pool import Lost, Task, process_pool, run_tasks
+from colloc.system.task_pool import Lost, Task, pool_for, process_pool, run_tasks
 
 
 def listed(tasks):
@@ -49,6 +49,12 @@ def test_a_worker_killed_mid_run_loses_nothing_and_one_that_always_dies_is_named
     assert {x: r for x, r in found.items() if x != 5} == {x: 2 * x for x in range(9) if x != 5}
     assert isinstance(found[5], Lost)
     assert "died twice" in found[5].message
+
+
+def test_results_that_are_there_at_once_come_in_the_order_in_which_their_tasks_were_begun():
+    tasks = [Task(x, (x,)) for x in range(50)]
+    ran = run_tasks(doubled, listed(tasks), workers=1, executor=pool_for, ahead=49)
+    assert [task.key for task, _ in ran] == list(range(50))
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="counts threads in /proc")
