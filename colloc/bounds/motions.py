@@ -55,7 +55,7 @@ class CoulombMotion(NamedTuple):
     def size(self) -> int:
         return self.spin.size
 
-    def take(self, chosen: np.ndarray | int) -> CoulombMotion:
+    def take(self, chosen: np.ndarray | np.intp) -> CoulombMotion:
         return CoulombMotion(*(each[..., chosen] for each in self))
 
     def join(self, *others: CoulombMotion) -> CoulombMotion:

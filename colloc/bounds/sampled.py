@@ -1,18 +1,14 @@
-r"""An upper bound on the efficiency of every gait of a body: derivation in docs/bound.md.
-
-For any function ``phi(q, theta)`` of the joint angles q and the heading theta of the middle link, a
-*potential*, the integral of its rate vanishes over a closed gait, so
+r"""An upper bound on the efficiency of every gait of a body: for any *potential* ``phi(q, theta)``
+of the joint angles and the heading of the middle link (docs/bound.md),
 
     efficiency <= max over q, theta, r of ( Re(e^{i theta} v) + d phi/dt ) / P,
 
 with ``phi = Re sum_k e^{i k theta} c_k(q)``, c_k tensor-product cubic B-splines with the parities
 of the symmetries.
 
-A convex program chooses the potential whose largest (gain / power) over all shapes, headings and
-rate directions is smallest, on few samples, and is checked on many. Narrow ridges, where a link
-changes between stick and slip, escape any lattice; so the optimum is climbed from a fresh lattice
-every round, and the summits join the samples until none rises above. `research/guarantee`
-guarantees a bound for associated friction.
+A convex program chooses the potential whose largest (gain / power) is smallest, on few samples.
+Narrow ridges, where a link changes between stick and slip, escape any lattice; so the optimum is
+climbed from a fresh lattice every round, and the summits join the samples until none rises above.
 """
 
 from __future__ import annotations
@@ -97,9 +93,7 @@ class TensorSpline:
     def cell(self, angle: np.ndarray) -> np.ndarray:
         return np.clip(np.searchsorted(self.knots, angle, side="right") - 1, 0, self.intervals - 1)
 
-    def matrices(
-        self, angles: np.ndarray, rates: np.ndarray
-    ) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+    def matrices(self, angles: np.ndarray, rates: np.ndarray) -> tuple[sparse.csr_matrix, ...]:
         """All functions at angles ``(n_joint, n)``, and their rates of change, ``(n, size)``."""
         n, one = angles.shape[1], BSpline(self.extend, np.eye(self.per_joint), DEGREE)
         value, change, column = np.ones((n, 1)), np.zeros((n, 1)), np.zeros((n, 1), dtype=np.int32)
@@ -110,10 +104,8 @@ class TensorSpline:
             value = _products(value, at)
             column = (column[:, :, None] * self.per_joint + alive[:, None]).reshape(n, -1)
         places, shape = (column.ravel(), np.arange(n + 1) * column.shape[1]), (n, self.size)
-        first, second = (
-            sparse.csr_matrix((entries.ravel(), *places), shape) for entries in (value, change)
-        )
-        return first, second
+        both = (sparse.csr_matrix((each.ravel(), *places), shape) for each in (value, change))
+        return tuple(both)
 
     @cached_property
     def roughness(self) -> sparse.csr_matrix:
@@ -201,8 +193,7 @@ class PotentialSpace:
         return {k: basis @ free[where] + 0j for k, basis, where in self.layout}
 
     def largest_ratios(self, free: np.ndarray, motion: CoulombMotion) -> np.ndarray:
-        """Largest (gain over heading) / power of each motion; `Samples` of a part at a time are
-        large."""
+        """`Samples.ratio` of each motion, of so many at once as memory holds."""
         parts = np.array_split(np.arange(motion.size), motion.size // _AT_ONCE + 1)
         ratios = (Samples(self, motion.take(part)).ratio(free)[0] for part in parts)
         return np.concatenate([*ratios])
@@ -379,9 +370,7 @@ class Bound:
 
     def report(self, efficiency: float) -> str:
         """Efficiency, bound, gap, and what is proved, in one line."""
-        proved = (
-            f"guaranteed {self.guaranteed:.4f}" if self.guaranteed is not None else self.missing
-        )
+        proved = self.missing if self.guaranteed is None else f"guaranteed {self.guaranteed:.4f}"
         return (
             f"efficiency {efficiency:.4f}, upper bound {self.sampled:.4f}, gap "
             f"{self.sampled - efficiency:.4f} ({proved})"
@@ -440,7 +429,7 @@ class _Program:
         self.best = smallest_maximum(self.rows, self.constants, self.penalty)
 
     def settle(self, excess: float) -> None:
-        """Exchange until no sample exceeds the program's value by more than `excess`."""
+        """Exchange until no sample exceeds the value by more."""
         for _ in range(_INNER_ROUNDS):
             ratio, heading = self.samples.ratio(self.best.x)
             if ratio.max() <= self.best.value + excess:
@@ -475,9 +464,7 @@ def compute_bound(domain: Domain, budget: Budget) -> tuple[Bound, Measure]:
     begin, body, law = time.process_time(), domain.body, domain.law
     usual = ((1, 3) if body.n_joint <= 2 else (1,)) if law.reversible else (0, 1)
     harmonics, tolerance = budget.harmonics or usual, budget.tolerance
-    shapes, directions, rounds, starts = (
-        budget.shapes, budget.directions, budget.rounds, budget.starts,
-    )  # fmt: skip
+    shapes, directions, starts = budget.shapes, budget.directions, budget.starts
     even = min(budget.first, budget.intervals)
     spline = TensorSpline(body.n_joint, domain.joint_limit, even)
     space = PotentialSpace(spline, harmonics, body.symmetric, budget.together)
@@ -489,12 +476,13 @@ def compute_bound(domain: Domain, budget: Budget) -> tuple[Bound, Measure]:
     program = _Program(samples, np.tile(chosen, 12), headings, rng, budget.smoothing)
     spacing, turn = 2.0 * domain.joint_limit / shapes, np.pi / directions
     seen, quiet, surprise = samples.motion.size, 0, _UNKNOWN
-    for count in range(1, rounds + 1):
+    for count in range(1, budget.rounds + 1):
         # a potential that the next climbs will refute need not be exact
         program.settle(float(np.clip(0.1 * surprise, max(_HELD, 0.2 * tolerance), 0.02)))
         free, level = program.best.x, program.best.value
         ratio: Callable[[CoulombMotion], np.ndarray] = partial(space.largest_ratios, free)
-        last = quiet > 0 or count == rounds
+        is_end = count == budget.rounds
+        last = quiet > 0 or is_end
         shift = max((count * _GOLDEN) % 1.0, 0.01)
         fresh = domain.lattice(shapes * (1 + last), directions * (1 + last), shift)
         pooled = fresh.join(program.samples.motion)
@@ -504,24 +492,21 @@ def compute_bound(domain: Domain, budget: Budget) -> tuple[Bound, Measure]:
         summit = domain.summits(ratio, pooled.take(chosen), *steps, rng, level - _HOPELESS)
         reached = ratio(summit)
         seen += fresh.size + chosen.size
-        top, best = (
-            max(float(reached.max()), float(values.max())),
-            summit.take(int(reached.argmax())),
-        )
+        top, best = float(max(reached.max(), values.max())), summit.take(reached.argmax())
         # two rounds in a row, the second on a finer lattice, must find nothing
         surprise = top - level
         quiet = quiet + 1 if top <= level + tolerance else 0
         coarse = space.spline.intervals < budget.intervals
         if (more := reached > level + 0.25 * tolerance).any():
             program.samples.add(summit.take(more))
-        if (quiet == 2 and not coarse) or count == rounds:
+        if (quiet == 2 and not coarse) or is_end:
             # what a check finds is no more than a sample that was missing
             finer = {"shapes": 3 * shapes, "directions": 2 * directions, "starts": 2 * starts}
             checked, motion = climb_from_lattice(domain, ratio, seed=count, level=level, **finer)
             if checked.max() > top:
-                top, best = float(checked.max()), motion.take(int(checked.argmax()))
+                top, best = float(checked.max()), motion.take(checked.argmax())
             quiet = quiet if top <= level + 2 * tolerance else 0
-            if quiet or count == rounds:
+            if quiet or is_end:
                 break
             if (more := checked > level + tolerance).any():
                 program.samples.add(motion.take(more))

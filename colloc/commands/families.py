@@ -21,6 +21,7 @@ from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import objective_from
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
+from colloc.pictures import render
 from colloc.results.archive import STATUSES, Basin, Outcome, basins, counts
 from colloc.results.solution import SOLVED, Solution
 from colloc.system.errors import ProblemError, StoreError
@@ -68,17 +69,9 @@ def starts_summary(
             {name: getattr(o, name) for name in ("start", "status", "message")} for o in failures
         ],
     }
-    ends = ", ".join(f"{n} {status}" for status, n in tally.items())
-    lines = [f"{problem.name}: {len(outcomes)} starts: {ends}; {len(optima)} distinct optima"]
-    for basin, row in zip(optima[:_MOST_SHOWN], rows, strict=False):
-        share = f"{len(basin.starts)} of {len(outcomes)} starts"
-        floor = "  on the bound smallest_shape_speed" * row["on_speed_floor"]
-        value = f"{problem.objective.name} {basin.best.value:.6f}"
-        lines.append(f"  {value}  {share:<20s} best: start {basin.best.start}{floor}")
-    if len(optima) > _MOST_SHOWN:
-        lines.append(f"  ... and {len(optima) - _MOST_SHOWN} more")
-    lines += [f"  start {o.start}: {o.status}: {o.message}" for o in failures[:_MOST_SHOWN]]
-    return optima, facts, lines
+    best = [basin.best.start for basin in optima]
+    shown = {"f": facts, "best": best, "objective": problem.objective.name, "most": _MOST_SHOWN}
+    return optima, facts, render("starts.txt", **shown).splitlines()
 
 
 @cli.command(
@@ -257,22 +250,9 @@ def sweep_summary(study: Study, table: StudyTable, path: Path) -> tuple[dict[str
         "counts": dict(tally),
         "below_neighbour": [study.coordinates(cell) for cell in below],
     }
-    shares = ", ".join(f"{n} {what}" for what, n in tally.items())
-    lines = [f"{study.name}: {total} cells: {shares}; saved {path}"]
-    if below:
-        lines.append(
-            f"  {len(below)} of them below what a neighbour's gait achieves there as it is: more "
-            f"starts may find more"
-        )
-    for cell in below[:_MOST_SHOWN]:
-        value, could = columns["value"][cell], columns["neighbour_value"][cell]
-        what = f"{value:.6f}, where a neighbour's gait achieves {could:.6f}"
-        lines.append(f"  {study.label(cell)}: {what}")
     failed = [cell for cell in study.cells() if status[cell] not in (SOLVED, "not tried")]
-    lines += [f"  {study.label(c)}: {columns['message'][c]}" for c in failed[:_MOST_SHOWN]]
-    if more := len(failed[_MOST_SHOWN:]):
-        lines.append(f"  ... and {more} more; all are in the file, with their messages")
-    return facts, lines
+    shown = {"below": below, "failed": failed, "columns": columns, "most": _MOST_SHOWN}
+    return facts, render("sweep.txt", f=facts, study=study, **shown).splitlines()
 
 
 def _begin(options: argparse.Namespace, ending: str) -> tuple[ProblemFile, Path, int | None]:
@@ -336,16 +316,9 @@ def steer(options: argparse.Namespace) -> int:
     def describe(
         family: Steering, members: dict[Path, Solution]
     ) -> tuple[str, dict[str, Any], list[str]]:
-        lines = [f"{len(members)} gaits that steer"]
-        for path, point in members.items():
-            arc = point.arc
-            radius = f"{arc.radius:8.4f}" if math.isfinite(arc.radius) else "       -"
-            lines.append(
-                f"  {math.degrees(arc.angle):+7.2f}°  radius {radius}  chord {arc.chord:.6f}  "
-                f"work {point.work:.6f}  efficiency {arc.chord / point.work:.6f}  "
-                f"{point.status}  {path}"
-            )
         facts = family.table() | {"efficiency": family.efficiency.tolist()}
+        how: Any = {"degrees": math.degrees, "isfinite": math.isfinite}
+        lines = render("steer.txt", members=members, **how).splitlines()
         return json.dumps(facts) + "\n", facts, lines
 
     return _end(options, find_family(options, stated, table, find, describe))

@@ -52,15 +52,6 @@ SUBCOMMANDS = {
     "sensitivity": ("results", "how the best value changes with friction, lengths, feet, limits"),
 }
 """Name to module of this package, with a function of that name, and what the command does."""
-_EXAMPLE = """\
-From a problem to a page to send:
-
-  colloc solve problems/three_link.py        results/three_link.h5, .png
-  colloc report results/three_link.h5        results/three_link.html
-  colloc animate results/three_link.h5       results/three_link.gif
-  colloc export results/three_link.h5 --max-speed 2.0 --rate 50
-
-`colloc COMMAND --help` explains a command."""
 _EXIT_CODES = """\
 Exit codes: 0 success; 1 different (--compare); 2 bad problem, option or file; 3 nothing found; 4 a
 certificate failed; 130 interrupted."""
@@ -70,11 +61,14 @@ Option = tuple[str, dict[str, Any]]
 Function = Callable[[argparse.Namespace], int]
 
 
+def _help_page(name: str) -> str:
+    return Path(__file__).with_name("help").joinpath(f"{name}.txt").read_text(encoding="utf-8")
+
+
 def help_text() -> str:
     width = max(map(len, SUBCOMMANDS))
-    head = "usage: colloc COMMAND ...\n\nFind and certify efficient gaits of crawling robots.\n\n"
-    lines = [f"  {name:<{width}}  {summary}" for name, (_, summary) in SUBCOMMANDS.items()]
-    return head + "\n".join(["commands:", *lines, "", _EXAMPLE])
+    lines = (f"  {name:<{width}}  {summary}" for name, (_, summary) in SUBCOMMANDS.items())
+    return _help_page("colloc").format(commands="\n".join(lines)).rstrip()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -142,11 +136,11 @@ def command(*options: Option) -> Callable[[Function], Callable[..., int]]:
     def register(function: Function) -> Callable[..., int]:
         def call(arguments: Sequence[str] | None = None) -> int:
             name = function.__name__
-            what, page = SUBCOMMANDS[name][1], Path(__file__).with_name("help") / f"{name}.txt"
+            what = SUBCOMMANDS[name][1]
             parser = Parser(
                 f"colloc {name}",
                 description=f"{what[0].upper()}{what[1:]}.",
-                epilog=f"{page.read_text(encoding='utf-8')}\n{_EXIT_CODES}",
+                epilog=f"{_help_page(name)}\n{_EXIT_CODES}",
                 formatter_class=argparse.RawDescriptionHelpFormatter,
             )
             for option, settings in (*options, *PRINTING):

@@ -11,6 +11,7 @@ import numpy as np
 
 from colloc.commands import main as cli
 from colloc.gaits.problem_file import read_problem_file
+from colloc.pictures import render
 from colloc.results.checks import Certificate
 from colloc.results.comparison import compare, verdict
 from colloc.results.robot import RobotSheet, stated_robot
@@ -110,22 +111,6 @@ def verify(options: argparse.Namespace) -> int:
             f"which is not what is found."
         )
     good = now.passed and not complaint and solution.success
-    lines = [
-        f"{problem.name}: {'verified' if good else 'NOT VERIFIED'}",
-        f"  {problem.objective.label:<15s} {now.value:.8f} +- {now.value_error:.0e} by replay "
-        f"({now.instants} time points)",
-    ]
-    if recorded.replayed:
-        value = f"{recorded.value:.8f} +- {recorded.value_error:.0e}"
-        lines.append(f"  in the file     {value} ({recorded.instants} time points)")
-    if not options.quiet:
-        lines += [f"  {check.line()}" for check in now.checks]
-    if complaint:
-        lines.append(f"  {complaint}")
-    if solution.status != "solved" and now.passed:
-        lines.append(f"  the solve itself ended as: {solution.status}. {solution.message}")
-    if dry is not None:
-        lines.append(f"  dry friction: {dry}")
     facts = {
         "file": options.result,
         "objective": problem.objective.name,
@@ -134,7 +119,9 @@ def verify(options: argparse.Namespace) -> int:
         "complaint": complaint,
         **({} if dry is None else {"dry": dry.facts()}),
     }
-    cli.tell(options, facts | now.facts(), lines)
+    shown = {"now": now, "dry": dry, "checks": not options.quiet}
+    text = render("verify.txt", f=facts, solution=solution, **shown)
+    cli.tell(options, facts | now.facts(), text.splitlines())
     return cli.OK if good else cli.FAILED
 
 
@@ -259,7 +246,6 @@ def animate(options: argparse.Namespace) -> int:
     cli.output("folder or file (default: beside the result)"),
 )  # fmt: skip
 def export(options: argparse.Namespace) -> int:
-    from colloc.pictures import render
     from colloc.pictures.export import Servo
 
     source = Path(options.result)

@@ -22,6 +22,7 @@ from colloc.gaits.problem_file import ProblemFile, Reference, read_problem_file
 from colloc.gaits.regime import Free
 from colloc.gaits.robot import Robot
 from colloc.mechanics.chain import Chain
+from colloc.pictures import render
 from colloc.results.robot import in_si, limit_lines, limit_shares
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
 from colloc.results.store import Saved, save_result
@@ -107,8 +108,6 @@ def _in_units(units: dict[str, float]) -> Callable[[str], float]:
     ),
 )
 def init(options: argparse.Namespace) -> int:
-    from colloc.pictures import render
-
     path: Path = options.problem
     source: Path | None = getattr(options, "from")
     for one, other in (("feet", "wheels"), ("from", "links")):
@@ -227,8 +226,6 @@ def summary_lines(
     solution: Solution, reference: Reference | None, *, verbose: bool = False
 ) -> list[str]:
     """Lines about a result for people; with `verbose` also the search, the gait and every check."""
-    from colloc.pictures import render
-
     problem, pace, slowly, moves = solution.problem, None, None, list[float]()
     replayed = solution.certificate.replayed
     if isinstance(problem.froude, Free):
@@ -500,10 +497,6 @@ def _front_table(
 ) -> tuple[str, dict[str, Any], list[str]]:
     (names, shown), gaps = front.in_units, {gap.after: gap for gap in front.gaps}
     aims, rows = [aim.expression for aim in front.objectives], list[dict[str, Any]]()
-    lines = [
-        f"{front.title}, {len(members)} gait{'s' * (len(members) > 1)}",
-        f"      {''.join(f'{name:>16s}' for name in names)}",
-    ]
     every = zip(members.items(), front.values.tolist(), shown.tolist(), strict=True)
     for k, ((path, point), values, numbers) in enumerate(every):
         both = zip((*aims, *names), (*values, *numbers), strict=True)
@@ -513,10 +506,6 @@ def _front_table(
             | {name: getattr(point, name) for name in ("distance", "work", "status")}
             | {"file": str(path), "gap": gaps[k].why if k in gaps else ""}
         )
-        lines.append(f"  {k:3d} {''.join(f'{x:16.7g}' for x in numbers)}  {point.status}")
-        if k in gaps:
-            lines.append(f"       no gait found between: {gaps[k].why}")
-    lines += [f"  {front.narrow}"] * bool(front.narrow)
     content = io.StringIO(newline="")
     writer = csv.DictWriter(content, rows[0])
     writer.writeheader()
@@ -526,4 +515,6 @@ def _front_table(
         "points": rows,
         "gaps": [asdict(gap) for gap in front.gaps],
     }
-    return content.getvalue(), facts, lines
+    table: Any = {"names": names, "shown": shown.tolist(), "gaps": gaps}
+    text = render("front.txt", front=front, members=members, **table)
+    return content.getvalue(), facts, text.splitlines()

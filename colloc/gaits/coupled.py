@@ -130,7 +130,7 @@ class Coupled(LinearClass):
         joints = self.joint_map(n_joint)
         motors = self.gait._basis(joints.n_motor)
         tables = motors.reshape(joints.n_motor, -1, motors.shape[1])
-        return np.asarray(np.tensordot(joints.matrix, tables, 1)).reshape(-1, motors.shape[1])
+        return np.tensordot(joints.matrix, tables, 1).reshape(-1, motors.shape[1])
 
     def _motors(self, gait: Any) -> Any:
         """The gait of the motors that is nearest to one of the joints."""

@@ -68,12 +68,11 @@ class Combination(GaitFunction):
 
     @property
     def rest(self) -> np.ndarray:  # type: ignore[override]
-        return np.asarray(self.basis.offset(self.n_joint))
+        return self.basis.offset(self.n_joint)
 
     @property
     def joint_map(self) -> JointMap | None:  # type: ignore[override]
-        joint_map: JointMap | None = self.basis.joint_map(self.n_joint)
-        return joint_map
+        return self.basis.joint_map(self.n_joint)
 
     @property
     def motor_gait(self) -> Any:

@@ -144,8 +144,7 @@ class Regime:
         """First delta of a search in a class; None: the body's default."""
         if self.slides:
             return _ON_SLOPE[gait_class.relative_delta]
-        first: float | None = gait_class.delta_start
-        return first
+        return gait_class.delta_start
 
     def travel_along(self, way: complex) -> complex:
         """Distance that counts, and across it as the imaginary part."""
@@ -269,8 +268,7 @@ def regime_of(problem: Any) -> Regime:
             raise ProblemError(
                 "a kind of motion of your own takes the place of grade and froude: leave these out."
             )
-        own: Regime = problem.motion
-        return own
+        return problem.motion
     free = None
     if isinstance(froude, (tuple, list)):
         if len(froude) != 2 or not all(map(is_number, froude)) or not 0 < froude[0] <= froude[1]:

@@ -68,7 +68,7 @@ class BoundedAngles:
 
     def largest(self, angles: np.ndarray) -> np.ndarray:
         values = self.rows @ angles if self.fine is None else self.fine(angles)
-        return np.asarray(np.abs(values).max(axis=0))
+        return np.abs(values).max(axis=0)
 
 
 class Sliding(NamedTuple):
@@ -171,7 +171,7 @@ class Body(Protocol):
         x, y = self.outline(angles)
         length = np.hypot(np.diff(x, axis=0), np.diff(y, axis=0))
         middles = np.stack([0.5 * (axis[1:] + axis[:-1]) for axis in (x, y)])
-        return np.asarray((length * middles).sum(axis=1) / length.sum(axis=0))
+        return (length * middles).sum(axis=1) / length.sum(axis=0)
 
     def describe(self) -> str:
         return type(self).__name__

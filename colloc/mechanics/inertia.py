@@ -61,7 +61,7 @@ def inertial_moments(
     mass = body.mass_column()
     along, across = growth.vs - link.w * link.vn, growth.vn + link.w * link.vs
     spin = body.inertia_column() * growth.w
-    return np.asarray(-moments_of_links(body, angles, LinkForce(mass * along, mass * across, spin)))
+    return -moments_of_links(body, angles, LinkForce(mass * along, mass * across, spin))
 
 
 def tail_velocity(body: Chain, angles: Array, rates: Array, states: Array) -> Array:

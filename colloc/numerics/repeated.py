@@ -196,7 +196,7 @@ class Nlp:
     def _values_at(self, at: np.ndarray) -> np.ndarray:
         """Objective and rows, ``(1 + m,)``, at ``(x, delta)``."""
         outputs = self._of_instances(_VALUES, self._columns(at))
-        return np.asarray(self._every @ np.concatenate([at[:-1], *outputs, [1.0]]))
+        return self._every @ np.concatenate([at[:-1], *outputs, [1.0]])
 
     def _slopes_at(self, at: np.ndarray) -> tuple[np.ndarray, sparse.csc_matrix]:
         """Gradient of the objective ``(n,)`` and Jacobian of the rows ``(m, n)``."""
@@ -215,7 +215,7 @@ class Nlp:
             columns.append([*given, weights[start:end].reshape(shape).T])
             start = end
         curvatures = self._of_instances(_CURVATURES, columns)
-        return np.asarray(self._on_curvatures @ np.concatenate(curvatures))
+        return self._on_curvatures @ np.concatenate(curvatures)
 
 
 class Program:
@@ -368,6 +368,6 @@ def implicit_derivatives(
     function: Any = ca.Function("derivatives", [y, z, parameter], [flat])
 
     def evaluate(y: np.ndarray, z: np.ndarray, parameter: float) -> np.ndarray:
-        return np.asarray(function(y, z, parameter).full()).reshape(-1, n_y, y.shape[1])
+        return function(y, z, parameter).full().reshape(-1, n_y, y.shape[1])
 
     return evaluate

@@ -51,7 +51,7 @@ class Scheme:
         nodes = np.append(0.0, self.c) if begin else self.c
         others = np.where(np.eye(nodes.size, dtype=bool), np.nan, nodes)
         factors = (np.asarray(tau)[:, None, None] - others) / (nodes[:, None] - others)
-        return np.asarray(np.nanprod(factors, axis=2))
+        return np.nanprod(factors, axis=2)
 
     def integrals(self, tau: np.ndarray) -> np.ndarray:
         """Integrals of the Lagrange polynomials from 0 to tau ``(k,)``, as ``(k, s)``."""

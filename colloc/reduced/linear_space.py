@@ -155,7 +155,7 @@ class LinearSpace(SearchSpace):
 
         def rows(functions_at: Callable[[np.ndarray], np.ndarray]) -> Constraints:
             def shapes(v: np.ndarray) -> np.ndarray:
-                return np.asarray(self._table(v) @ functions_at(v) + rest)
+                return self._table(v) @ functions_at(v) + rest
 
             def values(v: np.ndarray) -> np.ndarray:
                 found = checks.values(which, shapes(v), placed.shares)

@@ -196,7 +196,7 @@ class ReducedMotion:
             theta = self.at(v, delta).pose.at(k, tau)[0]
         angles, rates = self._space.at_times(v, t)
         shapes = Shapes(angles, rates, delta)
-        return np.asarray(limits.at(kind.instants(shapes, theta)))
+        return limits.at(kind.instants(shapes, theta))
 
     def share_slopes(
         self, limits: PathLimits, v: np.ndarray, delta: float, rows: np.ndarray
@@ -229,8 +229,8 @@ class ReducedMotion:
     def _at_points(self, formula: Any, s: _State, t: np.ndarray | None = None) -> np.ndarray:
         """Values of a formula ``(n_row, n_point)``; with torques also at times of the mesh."""
         if found := self._of_torques(formula):
-            return np.asarray(found[0](self._torque_arguments(s, t), s.delta).full())
-        return np.asarray(formula.at(self._instants(s)))
+            return found[0](self._torque_arguments(s, t), s.delta).full()
+        return formula.at(self._instants(s))
 
     def _along_torque_arguments(
         self, s: _State, at_points: np.ndarray
@@ -317,7 +317,7 @@ class ReducedMotion:
         if compiled is not None and compiled.covers(s.shapes):
             on_shape, more = compiled.vjp(s.shapes, s.z, s.out, gradients)
             on_shape += on_points[:, :-1].transpose(0, 2, 1)
-            return np.asarray(self._space.vjp(s.v, on_shape, on_pace + more))
+            return self._space.vjp(s.v, on_shape, on_pace + more)
         slopes, on_states = s.slopes
         by_theta = on_points[:, -1][:, mesh.points]
         rows, on_begin, _ = kind.vjp(mesh, s.pose, gradients, on_states * pace, by_theta, by_states)

@@ -303,7 +303,7 @@ class Solution:
         if not foot_kinds(body):
             return np.zeros((0, motion.t.size), dtype=bool)
         speeds = part_speeds(body, motion)[1]
-        return np.asarray(speeds < 3.0 * self.delta_per_period)
+        return speeds < 3.0 * self.delta_per_period
 
     @property
     def share_held(self) -> np.ndarray:
@@ -315,7 +315,7 @@ class Solution:
     @property
     def swings(self) -> np.ndarray:
         """Angles between the ends of the movement of each motor [rad], ``(n_motor,)``."""
-        return np.asarray(np.ptp(self.gait.motor_gait.angles(_INSTANTS), axis=1))
+        return np.ptp(self.gait.motor_gait.angles(_INSTANTS), axis=1)
 
     @property
     def is_tiny(self) -> bool:

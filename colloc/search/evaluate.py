@@ -45,6 +45,7 @@ from colloc.search.iterate import evaluate_at
 from colloc.search.options import OPTIONS, TOLERANCES, settings
 from colloc.smooth.smooth_body import schedule
 from colloc.system.arguments import check_finite
+from colloc.system.environment import higher
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.mesh_error import plan_mesh
 
@@ -336,14 +337,8 @@ class Identified:
         return {"coefficients": finite, **plain, "line": self.line}
 
     def __str__(self) -> str:
-        words = {0.0: "as stated", math.inf: "not determined by this motion"}
-        rows = [
-            f"{name:<10}  {value:<8.4g} {words.get(error, f'+- {error:.2g}')}"
-            for name, (value, error) in self.coefficients.items()
-        ]
-        off = f"{self.before:.2g} before, {self.after:.2g} after"
-        rows += [f"predicted path off by {off} (r.m.s.)", *self.remarks, self.line]
-        return "\n".join(f"  {row}" for row in rows)
+        text: str = higher("pictures:render")("identified.txt", found=self, isfinite=math.isfinite)
+        return text.rstrip("\n")
 
 
 def identify(

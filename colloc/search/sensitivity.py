@@ -32,6 +32,7 @@ from colloc.search.iterate import space_near, space_of
 from colloc.search.optimise import optimise
 from colloc.search.options import FINE, MEDIUM
 from colloc.search.solve import finish
+from colloc.system.environment import higher
 from colloc.system.errors import ProblemError
 from colloc.verification.replay import replayer
 
@@ -115,36 +116,8 @@ class Sensitivity:
 
     def lines(self) -> list[str]:
         """Lines of a table for a terminal."""
-        seen = self.seen
-        width = max((len(effect.name) for effect in seen), default=0)
-        lines = [
-            f"{self.name}: {self.objective} = {self.value:.6f} +- {self.error:.0e}; the best "
-            f"gait's elsewhere, to first order:",
-            f"  {'':<{width}}  {'now':>8s}  {'10 % less':>9s}  {'10 % more':>9s}  slope",
-        ]
-        for effect in seen:
-            less, more = self.beside(effect)
-            lines.append(
-                f"  {effect.name:<{width}}  {effect.now:8.4g}  {less:>9s}  {more:>9s}  "
-                f"{effect.slope:+.5f} +- {effect.error:.0e}"
-                f"{'' if effect.relative else '  (a tenth of its link)'}"
-            )
-        if without := [effect.name for effect in self.effects if effect not in seen]:
-            lines.append(f"  no effect to first order: {', '.join(without)}")
-        rows = []
-        for effect in self.effects:
-            scale, unit = (100, " %") if effect.relative else (1, "")
-            for there in effect.again:
-                change, best = f"{there.change * scale:+.3g}{unit}", f"{there.value:.4f}"
-                first, behind = self.value + there.change * effect.slope, f"{there.behind:9.1e}"
-                if not np.isfinite(there.value):
-                    best, behind = "-", f"  {there.status}"
-                row = f"{change:>7s}  {first:11.4f}  {best:>10s}  {there.kept:8.4f}  {behind}"
-                rows.append(f"  {effect.name:<{width}}  {row}  {there.breaks}".rstrip())
-        head = (
-            f"{'change':>7s}  {'first order':>11s}  {'best there':>10s}  {'on file':>8s}  behind by"
-        )
-        return [*lines, "", f"  {'':<{width}}  {head}", *rows] if rows else lines
+        render = higher("pictures:render")
+        return render("sensitivity.txt", slopes=self, isfinite=np.isfinite).splitlines()
 
 
 def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANGE) -> Sensitivity:

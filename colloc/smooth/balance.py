@@ -233,7 +233,7 @@ class PanelBatch:
         along = force_density(body, *force)[:2]
         ahead_x, ahead_y = (-panels.integrate(panels.widths * f, panels.n) for f in along)
         across = body.cos * ahead_y - body.sin * ahead_x
-        return np.asarray(-(body.weight * self.rate * across).sum(axis=0))
+        return -(body.weight * self.rate * across).sum(axis=0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -703,7 +703,7 @@ class CrawlerBody(SmoothBody):
 
     def _modes_at(self, x: np.ndarray) -> np.ndarray:
         """Profiles at places ``(n,)`` across the bump, -1 to 1, ``(n, modes)``."""
-        return np.asarray(self._profile(x[:, None], np.eye(self.modes)))
+        return self._profile(x[:, None], np.eye(self.modes))
 
     @property
     def bounded_angles(self) -> BoundedAngles:

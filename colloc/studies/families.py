@@ -300,8 +300,7 @@ def _thin(points: Iterable[_Point], intervals: int) -> list[_Point]:
 
 def _told(values: np.ndarray) -> np.ndarray:
     """Objectives by which the ends of a front can be told apart, ``(2,)``."""
-    told: np.ndarray = np.ptp(values, axis=0) > OPTIONS.close * np.abs(values).max(axis=0)
-    return told
+    return np.ptp(values, axis=0) > OPTIONS.close * np.abs(values).max(axis=0)
 
 
 def _apart(front: list[_Point], intervals: int) -> dict[tuple[_Point, _Point], np.ndarray]:

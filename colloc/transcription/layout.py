@@ -46,12 +46,12 @@ class Layout(SimpleNamespace):
         places = {each.name: total for each, total in zip(self.integrals, self.totals, strict=True)}
         places |= {"distance": self.distance[0, -1:], "work": self.work[0, -1:]}
         places |= {"rotation": self.theta[0, [-1, 0]], "period": self.static[:1, 0]}
-        return np.asarray(places[name])
+        return places[name]
 
     def shape_speed(self, x: np.ndarray) -> np.ndarray:
         if self.speed.size:
             return x[self.speed[0]]
-        return np.asarray(np.linalg.norm(x[self.rates], axis=0))
+        return np.linalg.norm(x[self.rates], axis=0)
 
     def tail_velocity(self, body: Any, x: np.ndarray) -> np.ndarray:
         if self.z.size:

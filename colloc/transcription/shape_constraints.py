@@ -91,7 +91,7 @@ class ShapeChecks:
     ) -> np.ndarray:
         """Of the gait with a table."""
         rest = gaits.offset(len(table)) * (which < self.n_shape)
-        return np.asarray(table @ self.functions(gaits, which, times) + rest)
+        return table @ self.functions(gaits, which, times) + rest
 
     def fresh_shares(self, which: np.ndarray, shapes: np.ndarray) -> np.ndarray:
         shares = np.full(which.size, -1.0)
@@ -313,7 +313,7 @@ class ShapeLimits:
         self._offset = np.concatenate(offsets)
 
     def bends(self, parameters: np.ndarray) -> np.ndarray:
-        return np.asarray(self._matrix @ parameters + self._offset)
+        return self._matrix @ parameters + self._offset
 
     def repeat(self, program: Program) -> dict[str, np.ndarray]:
         """Add the functions of angles; places of their values by the contacts' names."""

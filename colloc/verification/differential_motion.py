@@ -89,7 +89,7 @@ class _Interpolant:
         value = self._coefficients[-1, step]
         for each in self._coefficients[-2::-1]:
             value = value * x + each[step]
-        return np.asarray(value.T)
+        return value.T
 
 
 class Course(NamedTuple):
@@ -131,7 +131,7 @@ class _Integrals:
         t = (left[:, None] + (right - left)[:, None] * PANEL_RULE.c).ravel()
         densities = self._densities(t)
         stages = densities.reshape(len(densities), left.size, PANEL_RULE.c.size)
-        return np.asarray((right - left) * (stages @ PANEL_RULE.b))
+        return (right - left) * (stages @ PANEL_RULE.b)
 
     @property
     def whole(self) -> np.ndarray:
@@ -742,7 +742,7 @@ class GaitWithInertia(_Gait):
 
 def amplification(slopes: np.ndarray) -> np.ndarray:
     """Derivatives ``(7 + k, 3)`` of the end of a cycle by what each adds to the momenta."""
-    return np.asarray(np.linalg.solve(np.eye(3) - slopes[_MOMENTA].T, slopes.T).T)
+    return np.linalg.solve(np.eye(3) - slopes[_MOMENTA].T, slopes.T).T
 
 
 def _newton_step(gap: np.ndarray, slopes: np.ndarray) -> np.ndarray:
