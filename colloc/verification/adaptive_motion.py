@@ -80,7 +80,7 @@ def totals_along(
     h = (right - left) / pieces
     starts = left[:, None] + h[:, None] * np.arange(pieces)
     t = starts[:, :, None] + h[:, None, None] * PANEL_RULE.c
-    shapes: Any = None, None, *getattr(path, "driven", path)(t.ravel()), 0.0
+    shapes: Any = None, None, *getattr(path, "motor_gait", path)(t.ravel()), 0.0
     densities = np.asarray(quantity.at(Instants(*shapes)))[0].reshape(t.shape)
     return h * (densities @ PANEL_RULE.b).sum(axis=1)
 

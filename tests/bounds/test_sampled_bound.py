@@ -15,7 +15,6 @@ from colloc.bounds import sampled
 from colloc.bounds.motions import CoulombMotion, Domain, fundamental, two_resting
 from colloc.bounds.optimality_gap import gap_line, refusal, upper_bound
 from colloc.bounds.sampled import Budget, Samples, TensorSpline, efficiency_bound
-from colloc.mechanics.balance import instant, total_power
 from research.small_gaits import balanced_motion, small_gait
 from tests.shared.mechanics import coulomb
 
@@ -158,20 +157,6 @@ def test_mirror_images_and_end_swap_move_alike(mu, lengths):
     for image in ((-q, -r), (-q[::-1], r[::-1])):
         other = Samples(space, balanced_motion(body, friction, *image)).ratio(free)[0]
         np.testing.assert_allclose(other, ratio, rtol=1e-5)
-
-
-def test_centre_of_mass_gives_exactly_one_for_isotropic_friction():
-    """|int V ds| <= int |V| ds, with equality for a translation."""
-    body, rng = Chain(), np.random.default_rng(11)
-    q, r = random_points(12, 2000)
-    z = rng.standard_normal((3, 2000))
-    z[2, :100], r[:, :100] = 0.0, 0.0
-    now = instant(body, Friction(), q, r, z, 1e-13)
-    speed = np.hypot(*body.centre_velocity(now.posture, now.velocity))[0]
-    ratio = speed / total_power(now.velocity, now.force)[0]
-    assert ratio.max() <= 1 + 1e-12
-    np.testing.assert_allclose(ratio[:100], 1.0, rtol=1e-12)
-    assert ratio[100:].max() < 1
 
 
 def test_two_links_with_reversible_friction_cannot_move():

@@ -256,6 +256,14 @@ def test_what_the_intervals_miss_adds_up_to_what_all_of_them_do(objective):
     assert error.estimate > abs(error.total) > 1e-4
     assert np.abs(error.value).sum() > 2 * abs(error.total), "of either sign"
     assert np.median(np.abs(errors(48).value)) < 1e-7, "kinks are few"
+    collocated, true = (
+        reduced.period(v)
+        for reduced, v in (
+            program(problem(intervals=n, delta=0.1, objective=objective)) for n in (12, 96)
+        )
+    )
+    missed = abs(collocated["rotation"] - true["rotation"])
+    assert error.turning == pytest.approx(0.5 * missed / true["distance"], rel=0.01)
 
 
 def test_two_equal_links_go_nowhere_by_an_antipodal_gait():
@@ -335,9 +343,12 @@ def test_newtons_law_for_every_link_says_the_same():
 @pytest.mark.parametrize("grade", [0.0, 0.2])
 def test_joints_do_the_work_of_friction_and_climb(grade):
     gait = colloc.Fourier(GAIT.mean, GAIT.cos, GAIT.sin, theta=0.7)
-    how = {"regime": Regime(grade=grade), "quantities": [ALL]} if grade else {"quantities": [ALL]}
+    how = {"regime": Regime(grade=grade, towards=0.5 if grade else None), "quantities": [ALL]}
     played = with_inertia(CHAIN, FLOOR, gait, DELTA, FROUDE, tolerance=1e-7, **how)
     assert played.values["all_power"] == pytest.approx(played.work, rel=3e-7)
+    way = complex(*(played.states[4:6, -1] - played.states[4:6, 0]))
+    seen = way * np.exp(-0.5j) if grade else abs(way)
+    assert complex(played.distance, played.across) == pytest.approx(seen)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from colloc import Chain, Fourier, Friction, replay, solve_balance
+from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.balance import balance_jacobian, instant, total_power
 from colloc.mechanics.friction import line_integrals
 
@@ -100,16 +100,3 @@ def test_isotropic_balance_minimises_the_dissipation(case, exponent):
     rng = np.random.default_rng(0)
     for size in (1e-6, 1e-3, 1.0):
         assert potential(z + size * rng.normal(size=(3, 1))) >= potential(z) - 1e-12
-
-
-@settings(tried, max_examples=25)
-@given(st.lists(st.floats(-0.9, 0.9), min_size=6, max_size=6), friction, st.floats(-6, -2))
-def test_no_gait_beats_the_bound_of_the_smallest_coefficient(numbers, law, exponent):
-    """d <= W / min(mu), up to the delta that a period of viscous creep can add."""
-    mean, cos, sin = np.array(numbers).reshape(3, 2)
-    assume(np.hypot(cos, sin).max() > 0.05)
-    gait = Fourier(mean, cos[:, None], sin[:, None])
-    delta = 10.0**exponent
-    result = replay(Chain(), law, gait, delta, instants=200, most_instants=200)
-    assert result.distance <= (result.work / law.smallest + delta) * (1 + 1e-6)
-    np.testing.assert_allclose(result.actuator_work, result.work, rtol=1e-7)

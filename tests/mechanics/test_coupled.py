@@ -6,8 +6,9 @@ import pytest
 import colloc
 from colloc import Chain, Coupled, Friction, Harmonic, Problem
 from colloc.gaits.gait_fields import CLASSES, fields, gait_from, part_from
-from colloc.mechanics.densities import JointMap
+from colloc.mechanics.densities import LENGTH, JointMap
 from colloc.results.robot import joint_torques
+from colloc.verification.adaptive_motion import whole_totals
 from tests.shared.cases import slow_but
 
 LAW = Friction(mu_t=2.0, mu_f=1.0, mu_b=1.5)
@@ -60,6 +61,8 @@ def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_b
     slopes = (joints.angles(t + h) - joints.angles(t - h)) / (2 * h)
     np.testing.assert_allclose(joints.rates(t), slopes, atol=1e-7)
     np.testing.assert_allclose(joints.angles(t)[1], -0.5 * motors.angles(t)[0], atol=1e-12)
+    ways = [whole_totals([LENGTH], path)[0]["length"] for path in (joints, motors)]
+    assert ways[0] == ways[1]  # what the motors turn
     np.testing.assert_allclose(
         joints.joint_map.motor_rates(joints.angles(t) - joints.joint_map.offset), motors.angles(t)
     )

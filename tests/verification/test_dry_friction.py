@@ -210,13 +210,45 @@ def test_a_velocity_that_is_off_leads_as_far_as_it_carries_in_a_period(interval,
     assert found[1] == pytest.approx(exact[1])
 
 
-def test_a_rotation_that_is_open_turns_the_whole_way(interval):
-    exact, found = widths(interval()), widths(interval("apart", shifted(2)))
+@pytest.mark.parametrize("what", ["apart", "z"])
+def test_a_rotation_that_is_open_turns_the_whole_way(interval, what):
+    exact, found = widths(interval()), widths(interval(what, shifted(2)))
     angles, rates = GAIT(np.arange(2000) / 2000)
     z = BODY.solve(LAW, angles, rates, 1e-5).z
     posture = BODY.posture(angles)
     way = np.hypot(*BODY.centre_velocity(posture, BODY.velocity(posture, rates, z))).mean()
+    # that of the tail swings the centre of mass, too
+    way += (what == "z") * np.hypot(*BODY.centre(angles)).mean()
     assert found[0] - exact[0] == pytest.approx(2 * OFF * way, rel=0.02)
+
+
+@pytest.mark.parametrize(("apart", "part"), [(0.05, 0.0), (0.2, 1.0)])
+def test_a_motion_is_open_where_it_is_not_known_to_a_hundredth_of_the_largest_rate(
+    interval, apart, part
+):
+    largest = np.abs(GAIT(np.arange(2000) / 2000)[1]).max(axis=0)
+    assert 0.05 < 1e-2 * largest.min() < 1e-2 * largest.max() < 0.2
+    assert interval("apart", lambda n: apart).open == part
+
+
+@pytest.mark.parametrize("law", [ISOTROPIC, ELLIPTIC])
+def test_before_any_cut_no_rigid_motion_of_the_mean_speed_that_is_allowed_is_excluded(
+    monkeypatch, law
+):
+    monkeypatch.setattr(module, "_ROUNDS", 0)
+    body, rng = Chain((0.4, 0.6)), np.random.default_rng(6)
+    angles, rates = instants(body, 5) * np.reshape([0.1, 1.0], (2, 1, 1))  # nearly straight
+    found, part = dry_balance(body, law, angles, rates), (np.arange(50) + 0.5) / 50
+    ends = np.array([1, 1j]) @ np.stack(body.joints(angles)).swapaxes(0, 1)
+    points = ends[:-1, None] + part[:, None] * np.diff(ends, axis=0)[:, None]
+    arms, of_links = points - np.array([1, 1j]) @ body.centre(angles), np.array(body.lengths)
+    u, v, spin = rng.normal(size=(3, 500, 1, 1, 20)) * np.reshape([1.0, 1.0, 9.0], (3, 1, 1, 1, 1))
+    speed = np.abs(u + 1j * v + 1j * spin * arms).mean(axis=2).swapaxes(1, 2) @ of_links
+    allowed = 2 * found.most / law.smallest / speed
+    moves, turns = np.hypot(u, v)[:, 0, 0] * allowed, np.abs(spin[:, 0, 0]) * allowed
+    assert (moves <= found.apart[0]).all()
+    assert (turns <= found.apart[2]).all()
+    assert (turns.max(axis=0) / found.apart[2]).min() > 0.6
 
 
 @pytest.mark.parametrize(("what", "sign", "end"), [("least", -1, 0), ("most", 1, 1)])

@@ -14,7 +14,7 @@ from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.objective import EFFICIENCY
 from colloc.mechanics.contact import crossing_depth
 from colloc.verification.adaptive_motion import to_tolerance
-from colloc.verification.mesh_error import gait_motion
+from colloc.verification.mesh_error import gait_motion, mesh_error
 from tests.conftest import ROOT
 from tests.shared.cases import slow, slow_but
 
@@ -77,10 +77,10 @@ def test_distance_work_rotation_and_efficiency_are_as_exact_as_is_said(play, see
 
 
 def test_runs_that_agree_by_accident_are_no_more_exact_than_their_steps():
-    _, _, errors = to_tolerance(
-        lambda aim: (None, {"distance": 1.0, "work": 2.0}), 1e-3, EFFICIENCY, 1e-4, ({}, {})
-    )
+    ran, known = {"distance": 1.0, "work": 2.0}, ({"length": 3.0}, {"length": 7e-5})
+    *_, errors = to_tolerance(lambda aim: (None, ran), 1e-3, EFFICIENCY, 1e-4, known)
     assert min(errors.values()) > 1e-5
+    assert errors["length"] == 7e-5
 
 
 @pytest.mark.parametrize("mu", [slow(0.02), 0.05])
@@ -92,6 +92,9 @@ def test_meshes_are_held_against_a_motion_whose_error_is_known_where_friction_ha
     mesh = control.mesh()
     rough, fine = (gait_motion(control, LEANING, 1e-3, mesh, aim) for aim in (1e-4, 1e-7))
     assert np.abs(rough.at(mesh.edges) - fine.at(mesh.edges)).max() < rough.error < 1e-5
+    *_, x, y, work = np.diff(rough.at(np.array([0.0, 1.0])))[:, 0]
+    found = mesh_error(control, mesh, LEANING, 1e-3, fine=rough)
+    assert found.unresolved == pytest.approx(rough.error * (1 / np.hypot(x, y) + 1 / work))
 
 
 ELLIPSE = [[0.0, 0.0], [[2.0], [-2.0]], [[1.0], [1.0]]]

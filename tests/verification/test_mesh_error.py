@@ -57,6 +57,10 @@ def test_adaptive_panels_agree_with_a_uniform_replay(friction):
     fine = fine_motion(problem().body, friction, GAIT, DELTA, np.linspace(0, 1, 21), 1e-8)
     known = replayed(friction)
     assert fine.unresolved.sum() <= 1e-8
+    twice = fine_motion(
+        problem().body, friction, GAIT, DELTA, np.linspace(0, 1, 21), 1e-8, periods=2
+    )
+    np.testing.assert_array_equal(twice.edges, fine.edges)  # of the efficiency of all periods
     assert abs(fine.path[-1]) == pytest.approx(known.distance, rel=1e-7)
     assert fine.totals[0, -1] == pytest.approx(known.work, rel=1e-7)
     # dense output: the same motion from panels that end elsewhere
@@ -105,6 +109,20 @@ def test_shares_of_intervals_add_up_where_the_body_turns_in_half_a_period():
     assert abs(fine_of(stated, gait=gait).theta[-1]) > 0.1
     error = error_of(stated, gait=gait)
     assert error.value.sum() == pytest.approx(error.total, rel=0.02)
+
+
+def test_a_rotation_that_a_mesh_misses_turns_half_of_the_body_and_asks_for_another_mesh():
+    """However much the efficiency may err."""
+    gait = Fourier([0.6, 0.3], [[1.2], [-0.3]], [[0.3], [1.0]])
+    stated = problem("gauss-2", gait=Harmonic(1))
+    control, fine = control_problem(stated), fine_of(stated, gait=gait)
+    mesh = control.mesh()
+    nodes = mesh.edges[:-1, None] + mesh.h[:, None] * mesh.scheme.c
+    spin = rates_at(stated.body, stated.friction, gait, DELTA, nodes).z[2]
+    turned = 0.5 * abs(mesh.h @ spin @ mesh.scheme.b - fine.theta[-1]) / abs(fine.path[-1])
+    assert error_of(stated, gait=gait).turning == pytest.approx(turned, rel=1e-3)
+    assert turned > refinement.TURNING
+    assert plan_mesh(control, mesh, gait, DELTA, 1.0) is not None
 
 
 @each_friction
@@ -230,15 +248,16 @@ def test_a_refined_solution_knows_its_scheme_and_its_error():
     assert abs(answer.efficiency / known.efficiency - 1) < 1e-5
 
 
-def test_violations_are_reported_in_the_interval_where_they_are():
-    stated = problem()
-    control, wide = control_problem(stated), GAIT.scaled(1.2)
+@pytest.mark.parametrize("wide", [GAIT.scaled(1.2), Fourier([2.0, 2.0], [[0.3]] * 2, [[0.0]] * 2)])
+def test_violations_are_reported_in_the_interval_where_they_are(wide):
+    """Of a joint that bends too far, or links that cross."""
+    stated, t = problem(), np.linspace(0, 0.5, 2001)
+    control = control_problem(stated)
     mesh = control.mesh()
-    assert refinement.constraint_violation(control.admissible, mesh, GAIT).max() == 0
-    violation, t = (
-        refinement.constraint_violation(control.admissible, mesh, wide),
-        np.linspace(0, 0.5, 2001),
+    clear, violation = (
+        refinement.constraint_violation(control.admissible, mesh, gait) for gait in (GAIT, wide)
     )
+    assert clear.max() == 0
     angles = wide.angles(t)
     excess = np.maximum(np.abs(angles).max(axis=0) - np.pi, crossing_depth(stated.body, angles))
     cells = np.unique(np.clip(np.searchsorted(mesh.edges, t[excess > 1e-3]) - 1, 0, mesh.n - 1))

@@ -69,6 +69,9 @@ def test_on_the_level_it_is_the_replay():
     assert ran.friction_work[0] == pytest.approx(level.work, abs=1e-5)
     assert ran.turn == pytest.approx(level.rotation, abs=1e-5)
     assert ran.steering[0] == 1.0
+    # as the tail link lies where the gait goes nowhere
+    retraced = Fourier([0.5, 0.2], [[0.8], [0.3]], np.zeros((2, 1)))
+    assert slope_motion(Chain(), Friction(), retraced, 1e-2, 0.0, tolerance=1e-4).course == 0.0
 
 
 @pytest.mark.parametrize(
@@ -159,12 +162,15 @@ def test_the_steering_is_the_slope_of_the_map():
     assert abs(slope - 1.0) > 1e-2
 
 
-def test_the_stated_error_covers_the_true_one():
-    at = LOPSIDED, UNEQUAL, SKEW, 1e-3, 0.3
+@pytest.mark.parametrize("rough", [1.0, 100.0])  # works of 100 are off by most
+def test_the_stated_error_covers_the_true_one(rough):
+    at = LOPSIDED, UNEQUAL.in_units_of(1 / rough), SKEW, 1e-3, 0.3 * rough
     exact = slope_motion(*at, tolerance=1e-7).states[:5, -1]
     for tolerance in (1e-3, 1e-4):
-        ran = slope_motion(*at, tolerance=tolerance)
-        assert np.abs(ran.states[:5, -1] - exact).max() < ran.error < 30 * tolerance
+        ran, loose = (slope_motion(*at, tolerance=by * tolerance) for by in (1, 30))
+        off, seen = (np.abs(ran.states[:5, -1] - x).max() for x in (exact, loose.states[:5, -1]))
+        assert off < ran.error < 30 * tolerance
+        assert ran.error == pytest.approx(seen)
 
 
 def test_rates_may_jump_where_that_is_said():
