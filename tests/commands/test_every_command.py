@@ -82,6 +82,7 @@ report | nope.h5 | text.h5 | good.h5 --problem nope.py | good.h5 --period 1
 report good.h5 --output x.htm -> x.htm should end in .html
 animate | nope.h5 | text.h5 | good.h5 --periods 0 | good.h5 --seconds nan | good.h5 --fps 0
 animate | good.h5 --fps 1e9 | good.h5 --width 5 | good.h5 --format avi
+animate good.h5 --from-rest -> has no inertia, and is under way at once
 animate | good.h5 nope.h5 | good.h5 text.h5 | good.h5 good.h5 good.h5
 animate good.h5 --output x.avi -> x.avi should end in .gif or .mp4
 animate good.h5 --format mp4 --output x.gif -> x.gif should end in .mp4

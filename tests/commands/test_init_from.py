@@ -37,7 +37,7 @@ def joint(name, parent, child, at, axis="0 0 1", kind="revolute", limit=LIMIT):
 WORM = (
     *(link(name, mass, f"{middle} 0 0") for name, (mass, middle) in LINKS.items()),
     joint("j1", "tail", "mid", "0.10 0 0"),
-    joint("j2", "mid", "head", "0.12 0 0", axis="0 0 -1"),
+    joint("j2", "mid", "head", "0.12 0 0", axis="0 0 -1", limit=LIMIT.replace('"1.5"', '"1.1"')),
 )
 
 
@@ -63,7 +63,7 @@ def test_a_urdf_is_the_chain_that_one_computes_by_hand(tmp_path, capsys):
     assert problem.joint_limit == ((-0.5, 1.2), (-1.2, 0.5))
     robot = problem.robot
     assert (robot.length, robot.mass, robot.period) == pytest.approx((0.32, 0.6, 2.0))
-    assert (robot.max_speed, robot.max_torque) == (5.0, 1.5)
+    assert (robot.max_speed, robot.max_torque) == (5.0, (1.5, 1.1))
     assert "j1 = joint_1, j2 = -joint_2" in capsys.readouterr().out
     assert "j1 = joint_1, j2 = -joint_2" in (tmp_path / "mine.py").read_text(encoding="utf-8")
     # without a period nothing is in SI units
@@ -303,21 +303,30 @@ def test_lengths_in_any_unit_and_wheels_are_the_robot_s(tmp_path):
 
 
 def test_a_body_that_differs_from_both_ends_is_given_gaits_that_it_can_have(tmp_path):
-    for links, symmetry in (("1 2 1", "bilateral"), ("1 2 3", "none")):
-        assert stated(tmp_path / f"{symmetry}.py", f"--links {links}").gait.symmetry == symmetry
+    """Nor with inertia, which counts the sooner the more easily a body rolls."""
+    slow = "1 2 1 --length 1 --mass 1 --period 20"
+    known = (
+        ("1 2 1", "bilateral"),
+        ("1 2 3", "none"),
+        (slow, "bilateral"),
+        (f"{slow} --wheels", "none"),
+    )
+    for k, (links, symmetry) in enumerate(known):
+        assert stated(tmp_path / f"{k}.py", f"--links {links}").gait.symmetry == symmetry
 
 
 def test_a_robot_in_si_units_is_stated_whatever_units_are_typed(tmp_path):
-    words = "--links 22 30 30 22 --mu 0.3 --joint-limit 85deg --max-speed 60rpm --max-torque 1.2"
-    words += " --idle-power 2 --backlash 1deg --length {} --mass {} --period {}"
-    sizes = {"m": ("0.62", "0.9", "60"), "cm": ("62cm", "900g", "60000ms")}
-    problems = [stated(tmp_path / f"{unit}.py", words.format(*sizes[unit])) for unit in sizes]
+    words = "--links 22 30 30 22 --mu 0.3 --joint-limit 85deg --max-torque 1.2"
+    words += " --idle-power 2 --backlash 1deg --length {} --mass {} --period {} --max-speed {}"
+    sizes = f"0.62 0.9 60 {2 * math.pi}", "62cm 900g 60000ms 60rpm", "620mm 0.9kg 60s 360deg/s"
+    typed = [words.format(*each.split()) for each in sizes]
+    problems = [stated(tmp_path / f"{k}.py", each) for k, each in enumerate(typed)]
     for problem in problems:
         assert problem.joint_limit == pytest.approx(math.radians(85), abs=1e-5)
         assert problem.friction.mu_b == 0.3
         assert problem.least_distance is None  # electronics that run make it go far
     robot = problems[0].robot
-    assert robot == problems[1].robot
+    assert robot == problems[1].robot == problems[2].robot
     assert robot.max_speed == pytest.approx(2 * math.pi)
     assert robot.backlash == pytest.approx(math.radians(1))
 

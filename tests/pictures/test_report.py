@@ -117,6 +117,7 @@ def test_a_reader_who_hears_the_page_is_told_what_is_drawn_and_can_scroll_with_t
     assert scrolling
     assert all('tabindex="0"' in tag for tag in scrolling)
     assert not re.search(r"<th[^>]*></th>", page)
+    assert re.search(r"friction forwards</td><td>1</td><td>0.2895</td><td>0.2306<", page)
 
 
 def test_everything_from_the_file_is_escaped(three_link):
@@ -200,29 +201,6 @@ def test_the_page_of_a_turning_gait_states_angle_and_radius_and_claims_no_straig
     assert turning.to_xarray().attrs["turning_radius"] == turning.turning_radius
 
 
-@needs_browser
-def test_the_browser_draws_every_period_where_the_body_is_then(turning, tmp_path):
-    tell = """<script>
-      const seen = [], arc = CanvasRenderingContext2D.prototype.arc, slider = document.getElementById("phase");
-      CanvasRenderingContext2D.prototype.arc = function (x, y, ...rest) { seen.push([x, y]); arc.call(this, x, y, ...rest); };
-      for (const place of [100, 500, 900]) { slider.value = place; slider.dispatchEvent(new Event("input")); }
-      document.documentElement.dataset.seen = JSON.stringify(seen);
-    </script></body>"""
-    result = browsed(report_page(turning).replace("</body>", tell), tmp_path)
-    seen = np.array(json.loads(unescape(re.search('data-seen="([^"]*)"', result.stdout).group(1))))
-    motion = turning.sample(np.array([0.3, 1.5, 2.7]))
-    # hinges, then the head
-    joints = lab_outline(turning.problem.body, motion)[:, 1:]
-    drawn = np.concatenate([joints, motion.centre[:, None]], axis=1)
-    x, y = drawn.transpose(0, 2, 1).reshape(2, -1)
-    one, none = np.ones_like(x), np.zeros_like(x)
-    rows = np.concatenate([np.stack([x, one, none]), np.stack([-y, none, one])], axis=1).T
-    pixels = seen.T.ravel()
-    # a scale and a shift of the canvas, the same for all
-    fitted = rows @ np.linalg.lstsq(rows, pixels, rcond=None)[0]
-    np.testing.assert_allclose(pixels, fitted, atol=1.0)
-
-
 def browsed(page, folder):
     """A browser's document of a page as standard output, its complaints as errors."""
     file = folder / "page.html"
@@ -286,77 +264,123 @@ def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three
 
 
 def test_feet_that_hold_are_filled_in_the_film_of_a_card():
-    problem = Problem("feet", body=Chain(feet=1), gait=Harmonic(1), delta=1e-2)
+    body = Chain(feet=(colloc.Foot(0), colloc.Wheel(1), colloc.Pad(2, 0.2, 0.7)))
+    problem = Problem("feet", body=body, gait=Harmonic(1), delta=1e-2)
     found = evaluate(problem, ellipse(0.0, 1.6, 1.1))
     held = found.holding(found.sample(np.linspace(0.0, 1.0, 25)))[:, :-1]
     assert 0.1 < held.mean() < 0.9
     hollow = re.findall(r'attributeName="stroke-opacity"[^>]*values="([^"]+)"', found._repr_html_())
     drawn = [each.split(";") for each in hollow]
     np.testing.assert_array_equal(drawn, np.where(np.tile(held, 2), "0", "1"))
+    colours = re.findall('stroke="(#.{6})" stroke-width="8"', found._repr_html_())
+    assert colours == ["#d55e00", "#009e73", "#d55e00"]  # a wheel is green
 
 
-NODE = shutil.which("node")
+needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
 STAGE = """
-const made = [], element = id => ({
-  textContent: id === "toy-body" ? BODY : "", clientWidth: 600, clientHeight: 200, addEventListener() {},
-  getContext: () => new Proxy({}, { get: (_, name) => (...at) => made.push(at) }),
-});
-const said = element("toy-said"), sliders = Object.entries(VALUES).map(([name, value]) => ({
-  name, value: String(value), dataset: {}, addEventListener() {}, nextElementSibling: element(),
-}));
-globalThis.document = {
-  documentElement: null, getElementById: id => id === "toy-said" ? said : element(id), querySelectorAll: () => sliders,
+const made = [], elements = {}, lists = LISTS, texts = TEXTS;
+const element = id => elements[id] ||= {
+  textContent: texts[id] || "", value: "1", checked: true, dataset: {}, style: {}, clientWidth: 6000, clientHeight: 2000, addEventListener() {},
+  getContext: () => new Proxy({}, { get: (_, name) => (...at) => made.push([name, ...at]) }),
 };
+for (const each of Object.values(lists).flat()) Object.assign(each, { style: {}, addEventListener() {}, nextElementSibling: {} });
+globalThis.document = { documentElement: element("page"), addEventListener() {}, getElementById: element, querySelectorAll: what => lists[what] };
 globalThis.window = {
-  matchMedia: () => ({ matches: true }), getComputedStyle: () => ({ getPropertyValue: () => "black" }), requestAnimationFrame() {},
+  matchMedia: () => ({ matches: true, addEventListener() {} }), getComputedStyle: () => ({ getPropertyValue: () => "black" }),
+  requestAnimationFrame() {}, addEventListener() {}, location: { hash: "HASH" },
 };
 """
 FLOORS = [(3, (1, 1, 1)), (5, (3, 1, 1)), (8, (2, 0.5, 1.5)), (2, (1, 0.3, 0.9))]
 
 
-def played(page, before="", after=""):
-    """What the page's own script prints."""
-    (script,) = (text for text in outline(page).scripts if "function crawl" in text)
-    done = subprocess.run([NODE, "-e", before + script + after], capture_output=True, text=True)
+def played(page, of, after, lists=None, hash=""):
+    """What the page's own script with such words in it has made, on a stage with such elements."""
+    scripts = outline(page).scripts
+    (script,) = (text for text in scripts if of in text)
+    data = {"motion": '{"t"', "toy-body": '{"lengths"'}
+    texts = {id: next(x for x in scripts if x.startswith(begin)) for id, begin in data.items()}
+    stage = STAGE.replace("LISTS", json.dumps(lists or {})).replace("TEXTS", json.dumps(texts))
+    stage = stage.replace("HASH", hash) if lists else ""
+    words = ["node", "-e", f"{stage}{script}\nconsole.log(JSON.stringify([{after}]));"]
+    done = subprocess.run(words, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return json.loads(done.stdout)
 
 
-@pytest.mark.skipif(NODE is None, reason="node is not installed")
+def points(made):
+    return np.array([at[1:3] for at in made if at[0] in ("arc", "moveTo", "lineTo")], dtype=float)
+
+
+@needs_node
+def test_the_page_draws_every_period_as_the_body_friction_and_shape_are_then(turning):
+    page, scale = report_page(turning), frames(turning).arrow_scale
+    dot = {"first": 0, "second": 1, "sides": "10,90,20,80", "limits": "-3,3,-2,2"}
+    marks = {".cursor": [{"dataset": {"low": 10, "high": 90}}], ".dot": [{"dataset": dot}]}
+    for t in (0.2625, 1.4875, 2.6625):  # frames, and no edges of the mesh
+        after = 'made, elements["phase-shown"].textContent, elements.phase.value, lists'
+        made, said, place, lists = played(page, "function trail", after, marks, f"#t={t}")
+        arcs = [k for k, (name, *_) in enumerate(made) if name == "arc"]
+        drawn = points([made[k] for k in arcs]), points(made[arcs[-1] :])
+        pixels = np.concatenate([drawn[0], drawn[1][1::5], drawn[1][2::5]]).T.ravel()
+        shown = frames(turning, motion=turning.sample(np.array([t])))
+        # hinges and head, the centre, and arrows of friction from their base to their tip
+        base, tips = shown.arrow_base, shown.arrow_base + scale * shown.arrow
+        known = shown.ends[:, 1:], shown.motion.centre[:, None], base, tips
+        x, y = np.concatenate(known, axis=1)[..., 0]
+        one, none = np.ones_like(x), np.zeros_like(x)
+        rows = np.concatenate([np.stack([x, one, none]), np.stack([-y, none, one])], axis=1).T
+        # a scale and a shift of the canvas, the same for all
+        fit = np.linalg.lstsq(rows, pixels, rcond=None)[0]
+        np.testing.assert_allclose(pixels, rows @ fit, atol=1e-3 * fit[0])
+        assert (said, place) == (f"t = {t:.3f}", round(1000 * t / 3))
+        (cursor,), (spot,) = (lists[name] for name in marks)
+        a, b = shown.motion.angles[:, 0]
+        at = [float(x[:-1]) for x in (cursor["style"]["left"], *spot["style"].values())]
+        known = 10 + 80 * (t % 1), 10 + 80 * (a + 3) / 6, 80 - 60 * (b + 2) / 4
+        np.testing.assert_allclose(at, known, atol=0.01)
+
+
+@needs_node
 @pytest.mark.parametrize(("n_link", "mu"), FLOORS)
 def test_the_balance_in_the_page_moves_a_chain_as_the_replay_does(n_link, mu, page):
     lengths = np.random.default_rng(n_link).uniform(0.5, 1.5, n_link)
     lengths /= lengths.sum()
     body = json.dumps({"lengths": lengths.tolist(), "weights": lengths.tolist()})
-    gait = {"amplitude": 0.9, "lag": 1.1, "offset": 0}
-    call = f"const r = crawl({body}, {json.dumps(gait)}, {json.dumps(mu)}, 1e-2, 2000);"
-    print_it = "console.log(JSON.stringify([r.distance, r.work, r.turn]));"
-    distance, work, turn = json.loads(played(page, after=call + print_it))
+    gait = {"amplitude": 0.9, "lag": 1.1, "offset": 0.2}
+    call = f"crawl({body}, {json.dumps(gait)}, {json.dumps(mu)}, 1e-2, 2000)"
+    (moved,) = played(page, "function crawl", call)
     lag = 1.1 * (np.arange(1, n_link) - n_link / 2)[:, None]
-    wave = Fourier(np.zeros(n_link - 1), 0.9 * np.cos(lag), 0.9 * np.sin(lag))
+    wave = Fourier(np.full(n_link - 1, 0.2), 0.9 * np.cos(lag), 0.9 * np.sin(lag))
     floor = Friction(mu_t=mu[0], mu_f=mu[1], mu_b=mu[2])
     right = replay(Chain(tuple(lengths)), floor, lambda t: (wave.angles(t), wave.rates(t)), 1e-2)
-    assert distance == pytest.approx(right.distance, abs=1e-6)
-    assert work == pytest.approx(right.work, rel=1e-6)
-    assert turn == pytest.approx(0, abs=1e-9)
+    assert moved["distance"] == pytest.approx(right.distance, abs=1e-6)
+    assert moved["work"] == pytest.approx(right.work, rel=1e-6)
+    assert moved["turn"] == pytest.approx(right.rotation, abs=1e-6)
 
 
-@pytest.mark.skipif(NODE is None, reason="node is not installed")
-def test_sliders_of_the_page_say_and_draw_what_their_wave_does(page, three_link):
+@needs_node
+def test_sliders_of_the_page_say_and_draw_what_their_wave_does(page):
     """The ellipse with equal amplitudes a quarter apart is a wave with that lag."""
-    sliders = {"amplitude": 60, "lag": 90, "offset": 0, "mu_t": 1, "mu_f": 1, "mu_b": 1}
-    data = next(text for text in outline(page).scripts if text.startswith('{"lengths"'))
-    stage = STAGE.replace("BODY", json.dumps(data)).replace("VALUES", json.dumps(sliders))
-    said = played(page, stage, "\nconsole.log(said.textContent, made.length > 240);")
-    a, turn = np.pi / 3, np.sqrt(0.5)
+    values = {"amplitude": 60, "lag": 90, "offset": 9, "mu_t": 2, "mu_f": 1, "mu_b": 1.5}
+    sliders = [{"name": name, "value": str(x), "dataset": {}} for name, x in values.items()]
+    after = 'elements["toy-said"].textContent, made'
+    said, made = played(page, "function crawl", after, {"#toy-sliders input": sliders})
+    a = np.sqrt(0.5) * np.pi / 3
+    wave = Fourier([np.pi / 20] * 2, [[a], [a]], [[-a], [a]])
+    floor = Friction(mu_t=2, mu_f=1, mu_b=1.5)
     right = evaluate(
-        Problem("wave", gait=Harmonic(1), delta=1e-3),
-        Fourier([0.0, 0.0], [[turn * a], [turn * a]], [[-turn * a], [turn * a]]),
+        Problem("w", None, Chain(), floor, Harmonic(1), rotation=None, delta=1e-3), wave
     )
-    distance, work = map(float, re.findall(r"[\d.]+(?= body)|(?<=work )[\d.]+", said))
+    numbers = r"[\d.]+(?= body)|(?<=work )[\d.]+|(?<=by )[-\d.]+"
+    distance, work, turn = map(float, re.findall(numbers, said))
     assert distance == pytest.approx(right.distance, abs=1e-3)
     assert work == pytest.approx(right.work, rel=1e-3)
-    assert said.strip().endswith("true")
+    assert turn == pytest.approx(np.degrees(right.rotation), abs=0.06) != 0
+    # the way of the centre, and the body with its head and its centre, at first
+    *links, head, _, centre, _ = points(made)[241:] @ [1, -1j]
+    bends = np.angle(np.diff(links)[1:] / np.diff(links)[:-1])
+    np.testing.assert_allclose(bends, wave.angles(np.zeros(1))[:, 0])
+    assert (head, centre) == pytest.approx((links[-1], np.convolve(links, [1, 2, 2, 1])[3] / 6))
 
 
 NO_SLIDERS = {

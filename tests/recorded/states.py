@@ -65,7 +65,11 @@ STATED = {
         "robot": replace(ONE, period=5),
         "guess": LEANING,
     },
-    "snake": {"body": Chain((0.2,) * 5), "friction": Friction(mu_t=10.0), "guess": RUNNING},
+    "snake": {
+        "body": Chain((0.2,) * 5, width=0.03),
+        "friction": Friction(mu_t=10.0),
+        "guess": RUNNING,
+    },
     "climb": {"grade": 0.05, "guess": LEANING, "friction": Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0)},
     "pace": {
         "froude": Free(0.01, 0.5),

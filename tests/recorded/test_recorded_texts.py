@@ -22,8 +22,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 
-from colloc import Objective, save
+from colloc import Objective, Reference, save
 from colloc.commands.main import main
 from colloc.commands.solve import summary_lines
 from colloc.gaits.parameters import parameters
@@ -39,6 +40,7 @@ from tests.shared.store_samples import archive, outcome
 TEXTS = Path(__file__).with_name("texts")
 NUMBER = re.compile(r"([-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)")
 PRECISION, FACTOR, ROUNDING, OF_MACHINE = 2e-4, 3.0, 1e-6, 1e-12
+PAPER = Reference(0.25, 0.02, "a paper")
 MACHINE = {
     r"in \d+\.\d s\b": "in ... s",
     r"\d+ (time points|iterations)": r"... \1",
@@ -77,7 +79,7 @@ def colloc(*words):
 
 @also
 def summary(name, *verbose):
-    return "\n".join(summary_lines(state(name), None, verbose=bool(verbose)))
+    return "\n".join(summary_lines(state(name), PAPER if verbose else None, verbose=bool(verbose)))
 
 
 @also
@@ -117,17 +119,17 @@ def curvature(*stated):
 
 @also
 def film(name, beside=None):
-    """What the fourth picture of a film says and draws."""
+    """What the eighth picture of a film says and draws, in its second cycle."""
     made = []
 
     def kept(**how):
         made.append(Figure(**how))
         return made[-1]
 
-    other = beside and state(beside)
+    how = {"from_rest": True} if beside == "rest" else {"beside": beside and state(beside)}
     with patch("colloc.pictures.movie.Figure", kept):
-        drawn = pictures(state(name), 5, 2, width=400, beside=other)
-        for _ in range(4):
+        drawn = pictures(state(name), 5, 2, width=400, **how)
+        for _ in range(8):
             next(drawn)
     return described(made[0])
 
@@ -137,7 +139,7 @@ def page(name, lines=None, beside=None):
     """Words of the report, or so many lines of them, but for the drawings; of a front, too, with
     another result beside it."""
     more = {"front": front_of(name, beside), "beside": state(beside)} if beside else {}
-    text = words_of(report_page(state(name), gap="  upper bound 1", **more))
+    text = words_of(report_page(state(name), PAPER, "  upper bound 1", **more))
     # the file that states it has them, too
     words = re.sub(r"(?s)(All fields, as solved).*(How to)", r"\1\n\2", text).splitlines()
     return "\n".join(words[: int(lines or len(words))])
@@ -216,16 +218,19 @@ def described(figure):
             if len(xy) < 2:
                 xy = np.concatenate([xy[:0], *(path.vertices for path in marks.get_paths())])
             rows.append(f"  {type(marks).__name__}: {course(xy.T)}")
+            if isinstance(marks, Quiver):
+                rows.append(f"  its arrows: {course(np.array([marks.U, marks.V]))}")
     return "\n".join(rows)
 
 
 @also
 def pareto():
     front = front_of("robot", "small")
-    with patch("colloc.studies.families.pareto_front", return_value=front):
-        colloc("pareto", "loop.py", "--no-figure")
+    with patch("colloc.studies.families.pareto_front", return_value=front) as asked:
+        colloc("pareto", "loop.py", "--objectives", "speed", "towing", "--no-figure")
     again = read_front(Path("results/loop.front.csv"), front.problem)
-    return f"{front!r}\n{again!r}\n{again.gaps}\n{described(front.plot())}"
+    said = [front, again, again.gaps, {**asked.call_args[1], "progress": None}]
+    return "\n".join([*map(repr, said), described(front.plot())])
 
 
 @also
@@ -234,9 +239,10 @@ def steer():
     family = Steering(right.problem, (right.rotation, 0.0), (right, straight), None)
     spot = replace(family, turns=family.turns[:1], points=family.points[:1])
     family = replace(family, on_the_spot=spot)
-    with patch("colloc.studies.families.steer", return_value=family):
-        colloc("steer", "loop.py", "--no-figure")
-    return described(family.plot())
+    with patch("colloc.studies.families.steer", return_value=family) as asked:
+        colloc("steer", "loop.py", "--turn", "-10", "5", "--spot", "20", "--no-figure")
+    how = {**asked.call_args[1], "progress": None}
+    return f"{asked.call_args[0][1]}, {how}\n{described(family.plot())}"
 
 
 def span(values):

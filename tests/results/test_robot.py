@@ -76,7 +76,10 @@ def test_work_over_a_period_is_the_mean_power_and_moves_the_body_its_way(three_l
     seconds, powers = columns["t"].values, columns["joint_powers"].values.sum(axis=0)
     assert powers[:-1].mean() * 5 == pytest.approx(facts["work_per_period_J"], rel=1e-4)
     assert facts["mean_power_W"] == pytest.approx(facts["work_per_period_J"] / 5)
-    way = np.linalg.norm(columns["centre"].values[:, -1] - columns["centre"].values[:, 0])
+    centre, tail = (columns[name].values for name in ("centre", "tail"))
+    way = centre[0, -1] - centre[0, 0]  # along +x
+    arms = np.hypot(*three_link.sample(0.0).tail[:, 0]), np.hypot(*(tail - centre)[:, 0])
+    assert arms[1] == pytest.approx(1.2 * arms[0])
     assert facts["speed_m_per_s"] * 5 == pytest.approx(way, rel=1e-4)
     cost = facts["work_per_period_J"] / (3 * 9.81 * way)
     assert facts["cost_of_transport"] == pytest.approx(cost, rel=1e-4)

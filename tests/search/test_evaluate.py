@@ -116,7 +116,12 @@ def test_every_way_to_give_a_gait_gives_the_same_one(tmp_path):
 def test_noise_is_smoothed_and_what_is_left_out_is_stated():
     rng = np.random.default_rng(1)
     t = np.arange(400) / 400
-    found = fitted_gait(GAIT.angles(t) + 0.02 * rng.normal(size=(2, 400)), 2)
+    noisy = GAIT.angles(t) + 0.02 * rng.normal(size=(2, 400))
+    found, twice = (fitted_gait(np.repeat(noisy, n, axis=1), 2, harmonics=2) for n in (1, 2))
+    # samples that are written twice tell no more
+    sizes = (np.linalg.norm(each.uncertainty.directions) for each in (twice, found))
+    assert next(sizes) == pytest.approx(next(sizes), rel=0.1)
+    found = fitted_gait(noisy, 2)
     assert found.gait.n_harmonic == 2
     assert found.rms == pytest.approx(0.02, rel=0.1)
     # least squares averages: the noise times the root of coefficients over samples

@@ -36,6 +36,8 @@ def test_the_front_is_monotone_and_every_point_is_certified_and_as_its_problem_a
     speed, efficiency = front.values.T
     assert (np.diff(speed) < 0).all()
     assert (np.diff(efficiency) > 0).all()
+    # ends that differ in one objective are enough
+    assert not replace(front, objectives=(front.objectives[0], Objective("length"))).narrow
 
 
 def apart(front):
@@ -261,6 +263,8 @@ def test_the_table_holds_the_joint_angles_of_every_gait(family):
     np.testing.assert_array_equal(table["joint_angles_rad"], known)
     assert family.begins[1] == 0
     assert table["radius_body_lengths"][1] is None
+    works = table["work_per_period_weight_times_length"]
+    assert works == [point.work for point in family.points]
 
 
 def test_gaits_begin_where_they_are_nearest_to_their_neighbours():
@@ -299,6 +303,7 @@ def test_the_figure_shows_every_efficiency_at_its_turn_and_crosses_what_is_not_c
     bad = family.points[2]
     bad = replace(bad, answer=replace(bad.answer, optimal=False))
     known = np.array([np.degrees(TURNS), family.efficiency]).T
+    assert not replace(family, on_the_spot=replace(family, points=(bad,) * 3)).certified
     for points, crossed in ((family.points, []), ((*family.points[:2], bad), [2])):
         cost = plot_steering(replace(family, points=points)).axes[0]
         line, *crosses = (each.get_xydata() for each in cost.lines)

@@ -246,13 +246,15 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     path.write_text(FILE, encoding="utf-8")
 
     def run(*options):
-        code = multistart([str(path), "--output", str(out), *map(str, options)])
+        how = "--output", str(out), "--workers", "3", "--time-limit", "7"
+        code = multistart([str(path), *how, *map(str, options)])
         return code, *capsys.readouterr()
 
     def kept():
         return open_archive(read_problem_file(path).problem, out / "quick.starts.h5")
 
     def starts(archive, numbers, *, seed, **settings):
+        assert settings == {"sampler": SAMPLERS[0], "workers": 3, "time_limit": 7.0}
         for k in numbers:
             asked.append(k)
             archive.add({name(k, seed): outcome(k, ROUND)})

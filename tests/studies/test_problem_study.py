@@ -107,6 +107,7 @@ def test_a_sweep_runs_on_the_executor_that_is_passed_and_goes_on_from_its_folder
     first = colloc.sweep(grid(), tmp_path, **how)
     visits = len(seen)
     assert visits >= 12
+    assert "3 of 12, 18 s left" in str(dataclasses.replace(seen[2], seconds=6.0))
     assert set(asked) == {2}
     again = colloc.sweep(grid(), tmp_path, **how)
     assert len(seen) == visits
@@ -226,6 +227,10 @@ def test_a_cell_below_what_a_neighbours_gait_achieves_is_marked(fake, tmp_path, 
     # what was seen is in the journal
     again = StudyRun(grid(cold_starts=0), tmp_path)
     assert again.state((1, 1)).attempts
+    # best is who has the largest value, whatever its efficiency
+    other = dataclasses.replace(again.state((0, 0)).best.outcome, efficiency=9.0, value=0.1)
+    again.state((0, 0)).attempts.append(study_run.Attempt("", "", other))
+    assert again.state((0, 0)).best.outcome.efficiency < 9
     assert study_table(again).variables["below_neighbour"][1, 1]
 
 
