@@ -66,8 +66,10 @@ def test_a_urdf_is_the_chain_that_one_computes_by_hand(tmp_path, capsys):
     assert (robot.max_speed, robot.max_torque) == (5.0, (1.5, 1.1))
     assert "j1 = joint_1, j2 = -joint_2" in capsys.readouterr().out
     assert "j1 = joint_1, j2 = -joint_2" in (tmp_path / "mine.py").read_text(encoding="utf-8")
-    # without a period nothing is in SI units
-    assert read(tmp_path, WORM).robot is None
+    # without a period nothing is in SI units; a limit that is typed is the limit
+    problem = read(tmp_path, WORM, "--joint-limit", "85deg")
+    assert problem.robot is None
+    assert problem.joint_limit == pytest.approx(math.radians(85), abs=1e-5)
 
 
 def test_what_is_fixed_is_one_link_and_a_chain_may_begin_anywhere(tmp_path):
@@ -255,6 +257,7 @@ def test_what_is_no_planar_chain_is_refused_by_name_and_with_a_cure(more, words,
 @pytest.mark.parametrize(
     ("content", "word"),
     [
+        (WORM, "--from and --links"),
         ("<sdf/>", "<sdf>"),
         ("no xml", "as XML"),
         ("<robot xmlns:xacro='http://ros.org/wiki/xacro'><xacro:arm/></robot>", "xacro FILE"),
@@ -263,19 +266,9 @@ def test_what_is_no_planar_chain_is_refused_by_name_and_with_a_cure(more, words,
     ],
 )
 def test_other_files_are_named_for_what_they_are(content, word, tmp_path, capsys):
-    assert read(tmp_path, content) == BAD_PROBLEM
+    words = ["--links", "4"] if content is WORM else []
+    assert read(tmp_path, content, *words) == BAD_PROBLEM
     assert word in capsys.readouterr().err
-
-
-def test_lengths_are_not_stated_twice(tmp_path, capsys):
-    assert read(tmp_path, WORM, "--links", "4") == BAD_PROBLEM
-    assert "--from and --links" in capsys.readouterr().err
-
-
-def test_a_limit_stated_on_the_command_line_is_the_limit(tmp_path):
-    assert read(tmp_path, WORM, "--joint-limit", "85deg").joint_limit == pytest.approx(
-        math.radians(85), abs=1e-5
-    )
 
 
 def stated(path, words=""):

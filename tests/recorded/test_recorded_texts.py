@@ -139,6 +139,7 @@ def page(name, lines=None, beside=None):
     """Words of the report, or so many lines of them, but for the drawings; of a front, too, with
     another result beside it."""
     more = {"front": front_of(name, beside), "beside": state(beside)} if beside else {}
+    more |= {"robot": state(name).robot()} if beside else {}
     text = words_of(report_page(state(name), PAPER, "  upper bound 1", **more))
     # the file that states it has them, too
     words = re.sub(r"(?s)(All fields, as solved).*(How to)", r"\1\n\2", text).splitlines()
@@ -229,7 +230,9 @@ def pareto():
     with patch("colloc.studies.families.pareto_front", return_value=front) as asked:
         colloc("pareto", "loop.py", "--objectives", "speed", "towing", "--no-figure")
     again = read_front(Path("results/loop.front.csv"), front.problem)
-    said = [front, again, again.gaps, {**asked.call_args[1], "progress": None}]
+    other = read_front(Path("results/loop.front.csv"), front.problem.with_(delta=2e-2))
+    said = [front, again, again.gaps, other, {**asked.call_args[1], "progress": None}]
+    np.testing.assert_array_equal(again.values, front.values)
     return "\n".join([*map(repr, said), described(front.plot())])
 
 

@@ -1,7 +1,6 @@
 """On a robot: metres, kilograms and seconds, held against forces on dense points; joints that brake,
 the pace of a gait alone, slopes, and what an arc is."""
 
-import json
 import math
 from dataclasses import replace
 from xml.etree import ElementTree
@@ -22,9 +21,7 @@ from colloc import (
     slope_motion,
     solve,
 )
-from colloc.commands.main import main
 from colloc.gaits.objective import DRIVEN
-from colloc.pictures.report_page import report_page
 from colloc.results.motion import arc
 from colloc.results.robot import RobotSheet, in_si
 from colloc.studies.families import ParetoFront
@@ -171,22 +168,6 @@ def test_where_torques_depend_on_the_pace_no_other_pace_is_promised(unsolved):
         said = f"{name} needs another pace, and torques depend on it"
         with pytest.raises(ProblemError, match=said):
             swimmer.robot(**SIZE, **{name: 1.0})
-
-
-@pytest.mark.slow
-def test_command_file_page_and_figure_say_the_same(three_link, robot, tmp_path, capsys):
-    file = colloc.save(three_link, tmp_path / "x.h5")
-    words = ["--length", "1.2", "--mass", "3", "--period", "5"]
-    assert main(["robot", str(file), *words, "--json", "--figure"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    for name, value in robot.facts.items():
-        assert told[name] == (value if isinstance(value, str) else pytest.approx(value)), name
-    assert (tmp_path / "x.robot.png").stat().st_size > 10_000
-    assert main(["export", str(file), *words, "--rate", "100"]) == 0
-    columns = pandas.read_csv(tmp_path / "x.csv", comment="#").query("time_s >= 0")
-    torques = np.stack([columns["joint_1_N_m"], columns["joint_2_N_m"]])
-    np.testing.assert_allclose(torques, robot.torques(np.arange(500) / 500), rtol=1e-4, atol=2e-3)
-    assert f"{robot}".splitlines()[3] in report_page(three_link, robot=robot)
 
 
 def test_at_the_pace_that_is_slow_enough_inertia_takes_one_percent(three_link, robot):

@@ -16,7 +16,7 @@ from colloc.commands.main import main
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.pictures.figure import plot_front, plot_steering
 from colloc.search.solve import solve
-from colloc.studies.families import Gap, ParetoFront, Steering, read_front
+from colloc.studies.families import Gap, ParetoFront, Steering
 
 USUAL = {"gait": Harmonic(1, "bilateral"), "mesh_tolerance": 1e-4}
 PROBLEM = Problem("wide", friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=1e-2, **USUAL)
@@ -151,23 +151,6 @@ def test_a_robots_front_is_in_centimetres_a_second_and_joules_a_metre():
 def test_of_a_quantity_that_is_asked_for_twice_the_larger_value_counts():
     twice = PROBLEM.with_(at_least=[("distance", 0.1), ("distance", 0.2), ("work", 0.1)])
     assert [least for _, least in twice.at_least] == [0.2, 0.1]
-
-
-@pytest.mark.slow
-def test_the_command_writes_a_table_that_is_read_as_the_same_front(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "floor.py").write_text(ONE_FLOOR, encoding="utf-8")
-    words = "floor.py --points 2 --starts 1 --no-figure --json"
-    assert main(["pareto", *words.split()]) == 0
-    told, table = json.loads(capsys.readouterr().out), tmp_path / "results/floor.front.csv"
-    points = [load(row["file"]) for row in told["points"]]
-    assert [row["distance"] for row in told["points"]] == [point.distance for point in points]
-    assert points[0].distance > points[-1].distance
-    table.write_text(table.read_text().replace("00.h5,", "00.h5,a hole"))
-    again = read_front(table, points[-1].problem)
-    np.testing.assert_array_equal(again.values, [(p.distance, p.efficiency) for p in points])
-    assert again.gaps == (Gap(0, "a hole", True),)
-    assert read_front(table, points[-1].problem.with_(delta=2e-2)) is None
 
 
 @pytest.mark.slow
