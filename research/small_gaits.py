@@ -157,7 +157,7 @@ def best_small_gait(
     axis = np.linspace(-joint_limit, joint_limit, steps + 1)
     shapes = np.stack([a.ravel() for a in np.meshgrid(*[axis] * body.n_joint, indexing="ij")])
     shapes = shapes[:, fundamental(body, shapes)]
-    shapes = move_inside(body, shapes, np.zeros_like(shapes), _EDGE)
+    shapes = move_inside(body, shapes, np.zeros_like(shapes))
 
     def value_at(shape: np.ndarray, directions: int, headings: int, rounds: int) -> float:
         try:

@@ -109,15 +109,13 @@ def admissible(body: Chain, angles: np.ndarray, margin: float = 0.0) -> np.ndarr
     return inside & (crossing_depth(body, angles) <= margin) if body.width else inside
 
 
-def move_inside(
-    body: Chain, shapes: np.ndarray, towards: np.ndarray, margin: float = 0.0
-) -> np.ndarray:
+def move_inside(body: Chain, shapes: np.ndarray, towards: np.ndarray) -> np.ndarray:
     """Move shapes ``(n_joint, n)`` towards admissible ones until they are admissible too."""
     inside, beyond = np.zeros(shapes.shape[1]), np.ones(shapes.shape[1])
-    inside[admissible(body, shapes, margin)] = 1.0
+    inside[admissible(body, shapes, _EDGE)] = 1.0
     for _ in range(_BISECTIONS):
         middle = 0.5 * (inside + beyond)
-        keeps = admissible(body, towards + middle * (shapes - towards), margin)
+        keeps = admissible(body, towards + middle * (shapes - towards), _EDGE)
         inside, beyond = np.where(keeps, middle, inside), np.where(keeps, beyond, middle)
     return towards + inside * (shapes - towards)
 
@@ -291,7 +289,7 @@ class Domain:
             angles = rng.uniform(-1.0, 1.0, (n_joint, (steps + 1) ** 3))
             special = (rng.random(angles.shape) < _SPECIAL) & (np.arange(len(angles[0])) % 2 == 1)
             angles = limit * np.where(special, np.rint(angles), angles)
-            angles = move_inside(body, angles, np.zeros_like(angles), _EDGE)
+            angles = move_inside(body, angles, np.zeros_like(angles))
             return angles[:, fundamental(body, angles)]
         axis = limit * (2.0 * (np.arange(-1, steps + 1) + shift) / steps - 1.0)
         axis = np.unique(np.clip(axis, -limit, limit))
@@ -303,7 +301,7 @@ class Domain:
             holds = [np.delete(held, end, axis=joint) for end in (-1, 0)]
             for a, b in ((0, 1), (1, 0)):
                 touches = holds[a] & ~holds[b]
-                shapes.append(move_inside(body, ends[b][:, touches], ends[a][:, touches], _EDGE))
+                shapes.append(move_inside(body, ends[b][:, touches], ends[a][:, touches]))
         angles = np.concatenate(shapes, axis=1)
         return angles[:, fundamental(body, angles)]
 

@@ -219,11 +219,9 @@ ROBOT = (
     option(float, "--gravity G", "default: the problem's, or 9.81 m/s^2"),
 )
 PERIOD = option(float, "--period S", "seconds per cycle")
-MAX_SPEED = option(
-    float, "--max-speed V", "limit of the joints [rad/s]: one for all or one each", nargs="+"
-)
-MAX_TORQUE = option(
-    float, "--max-torque M", "limit of the joints [N m]: one for all or one each", nargs="+"
+MAX_SPEED, MAX_TORQUE = (
+    option(float, name, f"limit of the joints [{unit}]: one for all or one each", nargs="+")
+    for name, unit in (("--max-speed V", "rad/s"), ("--max-torque M", "N m"))
 )
 
 

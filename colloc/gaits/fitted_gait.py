@@ -345,10 +345,8 @@ class _Samples(NamedTuple):
         each = deviation[:, None] * np.eye(joints)
         directions = np.einsum("jk,ri->jrki", each, root).reshape(-1, joints, root.shape[1])
         if fit.chosen:
-            ends = (
-                fit._replace(period=fit.period * (1 + by)).columns(time) for by in (_STEP, -_STEP)
-            )
-            longer, shorter = ends
+            factors = 1 + _STEP, 1 - _STEP
+            longer, shorter = (fit._replace(period=fit.period * x).columns(time) for x in factors)
             by_period = table @ (longer - shorter).T / (2 * _STEP)
             along = by_period @ u
             orthogonal = ((by_period - along @ u.T) / deviation[:, None]) ** 2

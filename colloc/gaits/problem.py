@@ -501,13 +501,11 @@ class Problem:
         )
 
     def __repr__(self) -> str:
-        coordinates = (
-            f"{self.body.n_joint} {self.body.defaults.coordinate}{'s' * (self.body.n_joint > 1)}"
-        )
+        n_joint, coordinate = self.body.n_joint, self.body.defaults.coordinate
         best = "" if self.objective == EFFICIENCY else f"best {self.objective.name}, "
         return (
-            f"<Problem {self.name}: {best}{coordinates}, {self.law.label}{self.regime.label}, "
-            f"{self.gait.describe()}, delta {self.delta:.0e}>"
+            f"<Problem {self.name}: {best}{n_joint} {coordinate}{'s' * (n_joint > 1)}, "
+            f"{self.law.label}{self.regime.label}, {self.gait.describe()}, delta {self.delta:.0e}>"
         )
 
     def with_(self, **changes: object) -> Problem:

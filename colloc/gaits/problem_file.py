@@ -48,9 +48,8 @@ class Reference:
     source: str
 
     def verdict(self, efficiency: float) -> str:
-        verb = (
-            "agrees with" if abs(efficiency - self.efficiency) <= self.tolerance else "DIFFERS from"
-        )
+        agrees = abs(efficiency - self.efficiency) <= self.tolerance
+        verb = "agrees with" if agrees else "DIFFERS from"
         return f"{verb} {self.efficiency:g} +- {self.tolerance:g} ({self.source})"
 
 

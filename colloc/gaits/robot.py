@@ -87,9 +87,9 @@ class Robot:
                 f"period must be a number of seconds, or the shortest and the longest, not "
                 f"{shown(self.period)}."
             )
-        sizes = [("length", self.length), ("mass", self.mass), ("gravity", self.gravity)]
-        for name, value in [*sizes, *(("period", x) for x in paces)]:
-            check_range(1 / LARGEST, LARGEST, **{name: value})
+        sizes = {"length": self.length, "mass": self.mass, "gravity": self.gravity}
+        for each in (sizes, *({"period": pace} for pace in paces)):
+            check_range(1 / LARGEST, LARGEST, **each)
         check_range(0.0, LARGEST, idle_power=self.idle_power, backlash=self.backlash)
         if self.length > _LONGEST:
             raise ProblemError(
@@ -122,12 +122,10 @@ class Robot:
         froude: Any = Free(low, high) if len(times) == 2 else low
         if high < INERTIA_COUNTS * smallest_friction and len(times) == 1:
             froude = 0.0
-        root = math.sqrt(self.length / pressing)
-        idle, period = (
-            (self.idle_power * root / unit, " * period")
-            if len(times) == 2
-            else (self.idle_power * times[0] / unit, "")
-        )
+        seconds, period = times[0], ""
+        if len(times) == 2:
+            seconds, period = math.sqrt(self.length / pressing), " * period"
+        idle = self.idle_power * seconds / unit
         battery = f"distance / (driven_work + {idle:.17g}{period})"
         return {
             "objective": Objective(battery, name=BATTERY) if idle else DRIVEN,

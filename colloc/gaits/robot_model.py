@@ -214,9 +214,7 @@ def _parts(root: Element) -> list[_Part]:
             limited = joint.get("limited", "true" if low < high else "false")
             if limited == "true" or (limited == "auto" and low < high):
                 part.limit = (low, high)
-            part.speed, part.torque = (
-                float(_row(joint, x, "0", of)[0]) for x in ("speed", "torque")
-            )
+            part.speed, part.torque = (_row(joint, x, "0", of).item() for x in ("speed", "torque"))
         if part not in parts:
             parts.append(part)
         inertials = elements(body, "inertial", usual)

@@ -282,9 +282,8 @@ def to_class(
         start = start.grown(growth)
     if start is gait or not start.is_series:
         return start
-    return start.scaled(
-        min(1.0, largest_factor(body, joint_limit, start.angles(_PERIOD), start.rest))
-    )
+    most = largest_factor(body, joint_limit, start.angles(_PERIOD), start.rest)
+    return start.scaled(min(1.0, most))
 
 
 def warm_start(problem: Any, gait: Any, gait_class: Any, **changes: object) -> Any:

@@ -159,9 +159,6 @@ def _search(
     def direct(there: Moving, start: np.ndarray | None) -> np.ndarray:
         return _search(there, start, tolerance, max_iterations, "direct")[0]
 
-    def smoother(there: Moving) -> np.ndarray:
-        return direct(there._replace(delta=_SMOOTHER * there.delta), None)
-
     def continuation(there: Moving, side: float) -> np.ndarray | None:
         fastest, z = np.maximum(np.abs(there.rates).max(axis=0), there.delta), None
         for away in _AWAY:
@@ -178,7 +175,8 @@ def _search(
                 yield partial(Moving.at_rest, link=link), how
         if moving.load is None and moving.delta < np.abs(moving.rates).max(initial=0.0):
             # several rest nearly, each where the others let it
-            yield smoother, "natural"
+            smoother = moving.delta * _SMOOTHER
+            yield lambda there: direct(there._replace(delta=smoother), None), "natural"
         if method != "direct":
             # past a fold there is another balance, of which neighbouring times may know more
             for side in (-1.0, 1.0):

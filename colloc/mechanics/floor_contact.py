@@ -231,9 +231,7 @@ def Pad(link: int, first: float = 0.0, last: float = 1.0, **foot: Any) -> Foot:
 
 def whole_links(weights: np.ndarray) -> tuple[Foot, ...]:
     """Pads from end to end, for a body that lies on its links."""
-    return tuple(
-        Foot(link, weight=float(weight), extent=1.0) for link, weight in enumerate(weights)
-    )
+    return tuple(Foot(k, weight=float(weight), extent=1.0) for k, weight in enumerate(weights))
 
 
 def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot, ...]:
@@ -428,13 +426,11 @@ class FloorContact:
 
     def groups(self, friction: Law) -> list[Group]:
         if friction not in self._groups:
-            groups: dict[tuple[bool, Law], list[int]] = {}
+            groups: dict[tuple[Law, bool], list[int]] = {}
             laws, feet = self.laws(friction), set(range(len(self.parts))) - set(self.pads)
             for k in (*sorted(feet), *self.pads):
-                groups.setdefault((k in self.pads, laws[k]), []).append(k)
-            self._groups[friction] = [
-                Group(rows, law, pads) for (pads, law), rows in groups.items()
-            ]
+                groups.setdefault((laws[k], k in self.pads), []).append(k)
+            self._groups[friction] = [Group(rows, *key) for key, rows in groups.items()]
         return self._groups[friction]
 
     def velocities(self, velocity: LinkVelocity) -> LinkVelocity:

@@ -203,27 +203,14 @@ class LineIntegrals:
     def jacobian(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
         """Minus the derivative of the force with respect to (vs, vn, w), 3 x 3; a switch of
         coefficients is differentiated on its current side."""
-        return self._matrix(self.law.density_jacobian, vs, vn, w, length, delta)
+        return _matrix(self.law.density_jacobian, vs, vn, w, length, delta)
 
     def secant(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Matrix:
-        return self._matrix(self.law.density_secant, vs, vn, w, length, delta)
-
-    def _matrix(
-        self, density: Any, vs: Array, vn: Array, w: Array, length: Array, delta: Array
-    ) -> Matrix:
-        def at(sigma: Array, y: Array) -> tuple[Array, ...]:
-            (ss, sn), (ns, nn) = density(vs, y, delta)
-            couple = sigma * ns, sigma * nn, sigma * sigma * nn
-            return ss, sn, sigma * sn, ns, nn, sigma * nn, *couple
-
-        entries = _integrals(at, vs, vn, w, length, delta)
-        return tuple(tuple(entries[k : k + 3]) for k in (0, 3, 6))
+        return _matrix(self.law.density_secant, vs, vn, w, length, delta)
 
     def potential(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> Array:
-        def at(sigma: Array, y: Array) -> tuple[Array, ...]:
-            return (self.law.density_potential(vs, y, delta),)
-
-        return _integrals(at, vs, vn, w, length, delta)[0]
+        density = self.law.density_potential
+        return _integrals(lambda _, y: (density(vs, y, delta),), vs, vn, w, length, delta)[0]
 
     def scaled_laws(
         self, vs: Array, vn: Array, w: Array, length: Array, delta: Array, force: LinkForce
@@ -263,6 +250,16 @@ def _integrals(
             terms = [term.sum(axis=0) for term in terms]
         total = [a + b for a, b in zip(total, terms, strict=True)] if total else terms
     return total
+
+
+def _matrix(density: Any, vs: Array, *at: Array) -> Matrix:
+    def entries(sigma: Array, y: Array) -> tuple[Array, ...]:
+        (ss, sn), (ns, nn) = density(vs, y, at[-1])
+        couple = sigma * ns, sigma * nn, sigma * sigma * nn
+        return ss, sn, sigma * sn, ns, nn, sigma * nn, *couple
+
+    integrals = _integrals(entries, vs, *at)
+    return tuple(tuple(integrals[k : k + 3]) for k in (0, 3, 6))
 
 
 def _gauss_nodes(

@@ -351,12 +351,13 @@ def least_squares_multipliers(jacobian: sparse.csr_matrix, gradient: np.ndarray)
 
 
 def implicit_derivatives(
-    equations: Callable[[ca.SX, ca.SX, ca.SX], tuple[list[ca.SX], ca.SX]], n_y: int, n_z: int
+    equations: Callable[..., tuple[list[ca.SX], ca.SX]], n_y: int, n_z: int, *, shared: bool = False
 ) -> Callable[[np.ndarray, np.ndarray, float], np.ndarray]:
     """A function of y ``(n_y, n_time)``, z ``(n_z, n_time)`` and a parameter: total derivatives
     ``(n_out, n_y, n_time)`` along y of outputs at the z that solve ``residual = 0``.
 
-    equations: symbols y, z and the parameter to the outputs and the residual ``(n_z, 1)``.
+    equations: symbols y, z and the parameter to the outputs and the residual ``(n_z, 1)``. shared:
+    share subexpressions, which takes seconds for a body of many panels.
     """
     y, z, parameter = ca.SX.sym("y", n_y), ca.SX.sym("z", n_z), ca.SX.sym("parameter")
     outputs, residual = equations(y, z, parameter)
@@ -364,10 +365,5 @@ def implicit_derivatives(
     adjoint = ca.solve(ca.jacobian(residual, z).T, ca.jacobian(out, z).T)
     slope = ca.jacobian(out, y).T - ca.jacobian(residual, y).T @ adjoint
     flat = ca.vec(ca.densify(slope))
-    # sharing subexpressions makes it no faster, and takes seconds for a body of many panels
-    function: Any = ca.Function("derivatives", [y, z, parameter], [flat])
-
-    def evaluate(y: np.ndarray, z: np.ndarray, parameter: float) -> np.ndarray:
-        return function(y, z, parameter).full().reshape(-1, n_y, y.shape[1])
-
-    return evaluate
+    function: Any = ca.Function("derivatives", [y, z, parameter], [flat], {"cse": shared})
+    return lambda y, *more: function(y, *more).full().reshape(-1, n_y, y.shape[1])

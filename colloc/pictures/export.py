@@ -308,17 +308,11 @@ def _end(
     inertial = False
     with suppress(*_UNKNOWN):
         if froude:
-            long, gait = -float(time[0]), solution.gait
+            long = -float(time[0])
             spline = CubicHermiteSpline(1.0 + time / long, angles, long * rates, axis=1)
-
-            def approaching(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-                return spline(t), spline(t, 1)
-
-            pace = froude / long**2
-            begin = GaitWithInertia(body, law, approaching, delta * long, froude=pace, breaks=())
-            cycle = GaitWithInertia(
-                body, law, gait, delta, froude=froude, breaks=gait.corner_phases
-            )
+            entry: Any = body, law, lambda t: (spline(t), spline(t, 1)), delta * long
+            begin = GaitWithInertia(*entry, froude=froude / long**2)
+            cycle = solution.played_by(GaitWithInertia, froude=froude)
             state = begin.run(np.zeros(3), _ACCURACY).states[:, -1]
             state[:3] /= long
             before = state

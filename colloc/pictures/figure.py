@@ -413,9 +413,8 @@ def _draw_power(axes: Axes, solution: Solution) -> None:
 
 def _draw_convergence(axes: Axes, solution: Solution) -> None:
     """Objective against delta at every step of the search; crosses did not converge."""
-    deltas, values, good = np.array(
-        [(step.delta, step.value, step.optimal) for step in solution.history]
-    ).T
+    steps = [(step.delta, step.value, step.optimal) for step in solution.history]
+    deltas, values, good = np.array(steps).T
     good = good > 0
     axes.plot(deltas[good], values[good], "o-", color=BLUE, ms=4, lw=1.2)
     if good.any():

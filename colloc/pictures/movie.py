@@ -169,10 +169,8 @@ def pictures(
             shown.append(frames(each, a_period + 1, periods=number))
     planar = alone and solution.problem.gait.free and solution.problem.body.n_joint >= 2
     share = 0.68 if planar else 0.97 if alone else 0.48
-    windows = [
-        size * np.subtract(*each.window[::-1]) for size, each in zip(sizes, shown, strict=True)
-    ]
-    span = np.max(windows, axis=0)
+    windows = (np.subtract(*each.window[::-1]) for each in shown)
+    span = np.max([size * wide for size, wide in zip(sizes, windows, strict=True)], axis=0)
     tall = float(np.clip(span[1] / span[0], 0.4, 0.9)) * share * width
     height = 2 * round((tall + 0.13 * width) / 2)
     scale = max(span[0] / (share * width), span[1] / tall)  # lengths of a pixel

@@ -268,10 +268,8 @@ def _comparison_section(solution: Solution, other: Solution) -> dict[str, Any]:
 def _films(solutions: Mapping[str, Solution]) -> list[tuple[str, Markup]]:
     shown = {name: _film(each) for name, each in solutions.items()}
     scale = min(min(_FILM / np.ptp(each.window, axis=0)) for each in shown.values())
-    return [
-        (name, Markup(_card(each, shown[name], scale, film_alone=True)))
-        for name, each in solutions.items()
-    ]
+    cards = (_card(each, shown[x], scale, film_alone=True) for x, each in solutions.items())
+    return list(zip(solutions, map(Markup, cards), strict=True))
 
 
 def solution_card(solution: Solution) -> str:

@@ -345,7 +345,7 @@ def density_slopes(of: Quantity | PathLimits, now: Instants) -> np.ndarray:
     pulled, n, n_time = now.load is not None, 2 * len(now.angles), now.angles.shape[1]
     y = np.concatenate([now.angles, now.rates, now.load if pulled else np.empty((0, n_time))])
     evaluate = _density_slopes(now.body, now.friction, now.joint_map, of, pulled=pulled)
-    slope = evaluate(y, now.z, now.delta).full().reshape(-1, len(y), n_time)
+    slope = evaluate(y, now.z, now.delta)
     on_theta = np.zeros((len(slope), n_time))
     if pulled:  # an outside force turns against the body
         on_theta = slope[:, n] * now.load[1] - slope[:, n + 1] * now.load[0]
@@ -361,20 +361,20 @@ def _density_slopes(
     *,
     pulled: bool,
 ) -> Any:
-    """CasADi function (y, z, delta) to the total derivatives along y = (angles, rates, outside
-    force); the tail velocity z solves balance(z, y) = 0, so that dz/dy = -R_z^-1 R_y."""
-    import casadi as ca  # which a certificate can do without
+    """Along y = (angles, rates, outside force), at the tail velocity z that balances the body."""
+    from colloc.numerics.repeated import implicit_derivatives  # loads CasADi
 
-    sizes = {"q": body.n_joint, "r": body.n_joint, "z": 3, "delta": 1, "load": 2 * pulled}
-    angles, rates, z, delta, load = (ca.SX.sym(*each) for each in sizes.items())
-    y = ca.vertcat(angles, rates, load)
-    pull = load if pulled else None
-    out = of.at(Instants(body, friction, angles, rates, delta, z=z, load=pull, joint_map=joint_map))
-    slope = ca.jacobian(out, y).T
-    if of.needs_forces:
+    n = body.n_joint
+
+    def equations(y: Any, z: Any, delta: Any) -> tuple[Any, Any]:
+        angles, rates, load = y[:n], y[n : 2 * n], y[2 * n :] if pulled else None
+        more: Any = {"z": z, "load": load, "joint_map": joint_map}
+        out = of.at(Instants(body, friction, angles, rates, delta, **more))
+        if not of.needs_forces:
+            return [out], z
         balance = body.sliding(friction, angles, rates, z, delta).force
         if pulled:
             balance += load_wrench(body, body.posture(angles), load)  # type: ignore[attr-defined]
-        by_z = ca.solve(ca.jacobian(balance, z).T, ca.jacobian(out, z).T)
-        slope -= ca.jacobian(balance, y).T @ by_z
-    return ca.Function("slopes", [y, z, delta], [ca.vec(ca.densify(slope))], {"cse": True})
+        return [out], balance
+
+    return implicit_derivatives(equations, 2 * n + 2 * pulled, 3, shared=True)

@@ -172,11 +172,8 @@ class ActuatorRows:
             each = np.arange(share.size)
             near = np.clip(found[share, interval].argmax(axis=1), 1, SAMPLES - 1)
             left, right = t[interval, near - 1], t[interval, near + 1]
-
-            def own(t: np.ndarray) -> np.ndarray:
-                return self._sizes(v, delta, t)[share, each]
-
-            zoomed = peaks(own, left, right - left, _ZOOMS)[1]
+            at = left, right - left, _ZOOMS
+            zoomed = peaks(lambda t: self._sizes(v, delta, t)[share, each], *at)[1]
             largest[share, interval] = np.maximum(largest[share, interval], zoomed)
         return largest
 

@@ -171,9 +171,8 @@ class Answer:
         angles, rates = self.gait(phase)
         if symmetry == BILATERAL and isinstance(body, Chain):
             # seen from the head the body repeats itself with reversed rates
-            head, heading = body.seen_from_head(
-                self.gait.angles(solved), self.gait.rates(solved), z
-            )
+            q, r = self.gait(solved)
+            head, heading = body.seen_from_head(q, r, z)
             z = np.where(second, head, z)
             theta = np.where(second, theta + heading, theta)
             centre = np.where(second, 2 * end[:, None] - centre, centre)

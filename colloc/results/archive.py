@@ -135,7 +135,7 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     for outcome in sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value):
         path = fourier_series(problem, outcome.gait)
         for members, near in groups:
-            if are_one((members[0].value, near), (outcome.value, path), problem.body, problem.law):
+            if are_one(problem, (members[0].value, near), (outcome.value, path)):
                 members.append(outcome)
                 break
         else:

@@ -118,9 +118,8 @@ class Certificate(Period):
         """The certificate with the errors of the replay alone."""
         if self.of_samples is None:
             return self
-        return replace(
-            self.with_samples(tuple(-error for error in self.of_samples)), of_samples=None
-        )
+        errors = tuple(-error for error in self.of_samples)
+        return replace(self.with_samples(errors), of_samples=None)
 
     def facts(self) -> dict[str, Any]:
         """Plain numbers (JSON)."""
@@ -135,6 +134,12 @@ class Certificate(Period):
     @property
     def failures(self) -> list[Check]:
         return [check for check in self.checks if not check.passed]
+
+    @property
+    def missed(self) -> str:
+        """The values that fail, and what is allowed."""
+        each = (f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in self.failures)
+        return ", ".join(each)
 
 
 NUMBERS = tuple(each.name for each in fields(Certificate) if each.type in ("int", "float"))

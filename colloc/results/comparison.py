@@ -166,11 +166,11 @@ def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
     return min(phase_distance(a, image) for image in images(b, body, friction))
 
 
-def are_one(a: tuple[float, Fourier], b: tuple[float, Fourier], body: Body, friction: Law) -> bool:
+def are_one(problem: Problem, a: tuple[float, Fourier], b: tuple[float, Fourier]) -> bool:
     """True if two gaits, each by its value and its path, are the same."""
     (one, path), (other, near) = a, b
     close = abs(one - other) <= SAME_VALUE * max(abs(one), abs(other))
-    return close and distance(path, near, body, friction) < SAME_GAIT
+    return close and distance(path, near, problem.body, problem.law) < SAME_GAIT
 
 
 def series_class(problem: Problem) -> Harmonic:

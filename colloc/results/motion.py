@@ -231,9 +231,8 @@ def friction_arrows(
     cos, sin, x, y = (row[np.array(contact.links)[part]] for row in body.posture(angles))
     turn = pressed * (contact.cos + 1j * contact.sin)[part] * (cos + 1j * sin)
     force = turn * (fs + 1j * fn)
-    place = (
-        x + 1j * y + (contact.along[part] + along + 1j * contact.offset[part]) * (cos + 1j * sin)
-    )
+    on_link = contact.along[part] + along + 1j * contact.offset[part]
+    place = x + 1j * y + on_link * (cos + 1j * sin)
     return np.stack([place.real, place.imag]), np.stack([force.real, force.imag])
 
 

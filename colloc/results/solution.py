@@ -54,6 +54,10 @@ _MOST_CYCLES, _ALIKE, _ROUGHLY = 40, 0.02, 1e-4  # from rest; error of a cycle
 _TINY_SWING, _TINY_DISTANCE = math.radians(8), 0.02
 
 
+def _measured(name: str, what: str) -> property:
+    return property(attrgetter(f"measured.{name}"), doc=f"{what}, by replay if there was one.")
+
+
 @dataclass(eq=False)
 class Solution:
     """What a solve found.
@@ -139,23 +143,11 @@ class Solution:
         """Certificate if there was a replay, else the answer."""
         return self.certificate if self.certificate.replayed else self.answer
 
-    value = property(
-        attrgetter("measured.value"), doc="Value of the objective, by replay if there was one."
-    )
-    efficiency = property(
-        attrgetter("measured.efficiency"), doc="Distance over work, by replay if there was one."
-    )
-    distance = property(
-        attrgetter("measured.distance"),
-        doc="Displacement over a cycle, by replay if there was one.",
-    )
-    work = property(
-        attrgetter("measured.work"), doc="Work over a cycle, by replay if there was one."
-    )
-    rotation = property(
-        attrgetter("measured.rotation"),
-        doc="Net rotation over a cycle [rad], counter-clockwise, by replay if there was one.",
-    )
+    value = _measured("value", "Value of the objective")
+    efficiency = _measured("efficiency", "Distance over work")
+    distance = _measured("distance", "Displacement over a cycle")
+    work = _measured("work", "Work over a cycle")
+    rotation = _measured("rotation", "Net rotation over a cycle [rad], counter-clockwise")
     mesh = property(attrgetter("answer.mesh"), doc="Mesh of the collocation, in phases.")
     delta_per_period = property(
         attrgetter("answer.delta_per_period"), doc="Regularisation speed [body lengths per period]."

@@ -205,9 +205,8 @@ def _read_answer(group: h5py.Group, steps: h5py.Group, problem: Problem) -> Answ
         problem = problem.with_(delta=plain["delta"])
     if "guess" in group:  # the least speed was raised for a gait that would shrink
         guess = gait_from(json.loads(array(group, "guess")))
-        problem = problem.with_(
-            smallest_shape_speed=attribute(group, "smallest_shape_speed"), guess=guess
-        )
+        speed = attribute(group, "smallest_shape_speed")
+        problem = problem.with_(smallest_shape_speed=speed, guess=guess)
     names = [f.name for f in dataclasses.fields(SecondOrder)]
     second = SecondOrder(**{name: attribute(group, f"second_order_{name}") for name in names})
     columns = {f.name: array(steps, f.name).tolist() for f in dataclasses.fields(Step)}

@@ -225,10 +225,8 @@ def solve_in_regions(
     """Optimum of successive trust regions, each about the last one's end, with shape limits at the
     worst instants there; and the program of the last region. There are at most twenty: gaits of
     three joints go 2 rad and more."""
-    result, p = (
-        Solver(program, options).solve_within(x, delta, None, radius),
-        program.layout.decisions,
-    )
+    p = program.layout.decisions
+    result = Solver(program, options).solve_within(x, delta, None, radius)
     for _ in range(20):
         # the barrier keeps off the edge of the region
         if not result.optimal or np.abs(result.x[p] - x[p]).max() < 0.999 * radius:
@@ -278,9 +276,9 @@ def row_meaning(program: FullProgram, row: int) -> tuple[str, float]:
     if name == "rotation":
         return "closure of the net rotation", float(mesh.edges[-1])
     if name in program.cells:
-        what = "contact of" if name.startswith("links") else "the limit of"
-        what = what if name.startswith("links") or name in body.bounded_angles.names else "the"
-        return f"{what} {name}", float(mesh.edges[program.cells[name][index]])
+        kind = "the limit of" if name in body.bounded_angles.names else "the"
+        kind = "contact of" if name.startswith("links") else kind
+        return f"{kind} {name}", float(mesh.edges[program.cells[name][index]])
     integrals = {each.name: f"the {each.meaning or each.name}" for each in aims.integrals}
     what = integrals.get(name) or _MEANING.get(name.rstrip(" 0123456789"), f"the {name}")
     if name in ("angles", "rates"):
@@ -486,13 +484,13 @@ def _answer(
 
 def answer_of(program: FullProgram, result: NlpResult, delta: float) -> Answer:
     control, n, gait = program.control, program.layout.n, program.member(result.x)
-    multipliers: Any = {"lam_x": result.lam_x[:n], "lam_g": result.lam_g}
     answer = _answer(
         *(control, program.mesh, gait, result.x[:n], result, result),
         delta=delta,
+        lam_x=result.lam_x[:n],
+        lam_g=result.lam_g,
         value=control.unscale(-result.objective),
         program=control.formulation,
-        **multipliers,
     )
     return replace(answer, history=(answer.step,))
 
@@ -531,18 +529,23 @@ def solve_directly(problem: Problem) -> Answer:
     """A local optimum by IPOPT alone, at every level of delta, from the guess and the balance
     solver: what a reader of the equations would try first, and what the reduced search is measured
     against. It ends at the first level or mesh that fails, and its message says what did."""
-    history, run = tuple[Step, ...](), active_run()
+    history, run, knots = tuple[Step, ...](), active_run(), np.empty(0)
     space, v = space_near(problem, problem.guess)
-    parameters, mesh = space.full_parameters(v), space.mesh
-    levels = delta_levels(problem, problem.delta_start)
-    for done, delta in enumerate(levels):
-        run.report("descend", done, len(levels))
+    parameters, levels = space.full_parameters(v), delta_levels(problem, problem.delta_start)
+
+    def answer_at(delta: float) -> Answer:
+        nonlocal history
+        mesh = space.mesh
         answer = _solve_from(problem, parameters, delta, mesh.edges, mesh.scheme.name)
         history = (*history, answer.step)
+        return replace(answer, history=history)
+
+    for done, delta in enumerate(levels):
+        run.report("descend", done, len(levels))
+        answer = answer_at(delta)
         if not answer.optimal:
-            return replace(answer, history=history)
+            return answer
         parameters = answer.x[answer.layout.decisions]
-    knots = np.empty(0)
     for done in range(OPTIONS.meshes if problem.mesh_tolerance > 0 else 0):
         run.report("refine", done, OPTIONS.meshes)
         gait, control = answer.gait, space.control
@@ -553,13 +556,11 @@ def solve_directly(problem: Problem) -> Answer:
         knots = np.concatenate([knots, plan.kept])
         space, v = space_near(problem, gait, plan.edges, plan.scheme)
         parameters = space.full_parameters(v)
-        answer = _solve_from(problem, parameters, delta, space.mesh.edges, plan.scheme)
-        history = (*history, answer.step)
+        answer = answer_at(delta)
         if not answer.optimal:
-            return replace(answer, history=history)
+            return answer
     space, v = space_near(problem, answer.gait, answer.edges, answer.scheme)
-    curved = second_order(space, v, answer.delta, answer.value)
-    return replace(answer, second_order=curved, history=history)
+    return replace(answer, second_order=second_order(space, v, answer.delta, answer.value))
 
 
 @checkpoint

@@ -140,16 +140,12 @@ def evaluate(
         answer = on_fine_mesh(stated, driven)
     certificate, said = UNCERTIFIED, ""
     if goes_nowhere(answer):
-        said = " It has no net displacement, so there is nothing to certify: does it "
-        said += "retrace its path?"
+        what = "there is nothing to certify: does it retrace its path?"
+        said = f" It has no net displacement, so {what}"
     else:
         try:
             certificate = certify(answer)
-            failures = ", ".join(
-                f"{check.name} {check.value:.1e} (allowed {check.threshold:.0e})"
-                for check in certificate.failures
-            )
-            said = f" It fails: {failures}." if failures else ""
+            said = f" It fails: {certificate.missed}." if certificate.missed else ""
         except NotConvergedError as error:
             said = f" The replay failed: {error}"
     if fitted.uncertainty is not None and certificate.replayed:
@@ -323,9 +319,7 @@ class Identified:
         feet = getattr(body, "feet", ())
         if not any(foot.friction is not None for foot in feet):
             return f"friction={self.problem.friction!r}"
-        plain = tuple(
-            replace(foot, weight=None) for foot in feet
-        )  # weights are said if they differ
+        plain = tuple(replace(foot, weight=None) for foot in feet)  # said if they differ
         text = repr(plain if replace(body, feet=plain).feet == feet else feet)
         text = re.sub(r", (weight=None|(offset|angle|extent)=0\.0)\b", "", text)
         return "feet=" + re.sub(r"(?<=place=)0\.\d+", lambda x: f"{float(x[0]):.6g}", text)

@@ -152,7 +152,7 @@ def explore(problem: Problem, starts: int | None = None) -> Exploration:
     more = (
         other
         for other, path in zip(large.others, new, strict=True)
-        if not any(are_one(one, path, problem.body, problem.law) for one in old)
+        if not any(are_one(problem, one, path) for one in old)
     )
     others = sorted([*any_size.others, *more], key=lambda other: -other.value)
     return Exploration(optima, any_size.starts + large.starts, others, any_size.left)
@@ -241,7 +241,7 @@ def same_gait(problem: Problem, a: Iterate, b: Iterate) -> bool:
     if abs(a.objective - b.objective) > SAME_VALUE * max(abs(a.objective), abs(b.objective)):
         return False  # before the paths are transformed
     one, other = ((each.objective, fourier_series(problem, each.gait)) for each in (a, b))
-    return are_one(one, other, problem.body, problem.law)
+    return are_one(problem, one, other)
 
 
 def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], int]:
@@ -546,9 +546,9 @@ def _shapes(problem: Problem) -> np.ndarray:
     # of a shape and its mirror image, the one whose first bend is to the left
     first = np.take_along_axis(means, (means != 0).argmax(axis=1)[:, None], axis=1)
     means = np.unique(np.where(first < 0, -means, means) + 0.0, axis=0)
-    factors = (
-        min(1.0, largest_factor(body, limit, mean[:, None], rest[:, None])) for mean in means
-    )
-    return np.array(
-        [rest + (mean - rest) * factor for mean, factor in zip(means, factors, strict=True)]
-    ).T
+
+    def admissible(mean: np.ndarray) -> np.ndarray:
+        factor = largest_factor(body, limit, mean[:, None], rest[:, None])
+        return rest + (mean - rest) * min(1.0, factor)
+
+    return np.array([*map(admissible, means)]).T

@@ -31,7 +31,8 @@ from colloc.search.explore import (
 from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
 from colloc.search.optimise import descend, leave_saddle, refine
 from colloc.search.options import OPTIONS, TOLERANCES, settings
-from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.system.arguments import check_choice
+from colloc.system.errors import NotConvergedError
 from colloc.system.interruption import clear_interrupt
 
 REDUCED, FULL = "reduced", "full"
@@ -63,8 +64,7 @@ def solve(
     is refined; what it raises ends the solve. After Ctrl-C, or once the time is over, the best gait
     so far is returned.
     """
-    if search not in SEARCHES:
-        raise ProblemError(f"search must be one of {', '.join(SEARCHES)}, not {search!r}.")
+    check_choice(SEARCHES, search=search)
     begin, run = time.monotonic(), Run(keep, problem, progress)
     try:
         with run.active(seconds):
@@ -195,10 +195,9 @@ def certify_answer(problem: Problem, answer: Answer) -> Solution:
         solution.message = text  # why the search ended says more than what does not hold for that
         return solution
     if failed := solution.certificate.failures:
-        failures = ", ".join(f"{c.name} {c.value:.1e} (allowed {c.threshold:.0e})" for c in failed)
         finer = "a smaller mesh_tolerance"
         advice = " and ".join(dict.fromkeys(_ADVICE.get(c.name, finer) for c in failed))
-        text = f"the certificate failed: {failures}. Try {advice}. {text}"
+        text = f"the certificate failed: {solution.certificate.missed}. Try {advice}. {text}"
     elif is_free and on_speed_floor(problem, answer.gait):
         better = "more efficient" if problem.objective == EFFICIENCY else "better"
         text = (

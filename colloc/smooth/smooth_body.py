@@ -300,6 +300,12 @@ class ModalBody(SmoothBody):
         return -project @ np.sin(phase), project @ np.cos(phase)
 
 
+def _check_below(most: float, words: str, **numbers: float) -> None:
+    for name, value in numbers.items():
+        if not 0 < value < most:
+            raise ProblemError(f"{name} must lie between 0 and {words}, not {value!r}.")
+
+
 _TURN = 2 * np.pi
 ODD_SCALE = 7**3.5 / 6**3
 _CHORD_NODES, _CHORD_WEIGHTS = np.polynomial.legendre.leggauss(48)
@@ -390,27 +396,28 @@ class Wave(PrescribedBody):
 
     def prescribed(self) -> Motion:
         """Return the motion."""
-        a, steepness = self.amplitude, self.steepness
+        a, k, sign = self.amplitude, self.steepness, -1.0 if self.profile == "tanh" else 1.0
 
-        def sine(s: np.ndarray, t: np.ndarray, rate: bool = False) -> np.ndarray:
-            phase = _TURN * (self.waves * s + t)
-            return _TURN * (a * np.cos(phase)) if rate else a * np.sin(phase)
+        def phase(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+            return _TURN * (self.waves * s + sign * t)
 
-        def tanh(s: np.ndarray, t: np.ndarray, rate: bool = False) -> np.ndarray:
-            phase = _TURN * (self.waves * s - t)
-            inner = steepness * np.sin(phase)
-            if not rate:
-                return a * np.tanh(inner)
-            slope = a * steepness * np.cos(phase) / np.cosh(np.clip(inner, -300, 300)) ** 2
-            return -_TURN * slope
+        def tanh_rate(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+            cosh = np.cosh(np.clip(k * np.sin(phase(s, t)), -300, 300))
+            return -_TURN * (a * k * np.cos(phase(s, t)) / cosh**2)
 
-        def standing(s: np.ndarray, t: np.ndarray, rate: bool = False) -> np.ndarray:
-            in_time = _TURN * np.cos(_TURN * t) if rate else np.sin(_TURN * t)
-            return a * np.sin(_TURN * s) * in_time
-
-        theta = {"sine": sine, "tanh": tanh, "standing": standing}[self.profile]
         stages = (0.0, 0.25, 0.5) if self.profile == "standing" else (0.0, 0.5)
-        return Motion(theta, lambda s, t: theta(s, t, rate=True), stages=stages, antipodal=True)
+        angle, rate = {
+            "sine": (
+                lambda s, t: a * np.sin(phase(s, t)),
+                lambda s, t: _TURN * (a * np.cos(phase(s, t))),
+            ),
+            "tanh": (lambda s, t: a * np.tanh(k * np.sin(phase(s, t))), tanh_rate),
+            "standing": (
+                lambda s, t: a * np.sin(_TURN * s) * np.sin(_TURN * t),
+                lambda s, t: a * np.sin(_TURN * s) * (_TURN * np.cos(_TURN * t)),
+            ),
+        }[self.profile]
+        return Motion(angle, rate, stages=stages, antipodal=True)
 
     def describe(self) -> str:
         return f"smooth, a {self.profile} wave of amplitude {self.amplitude:g} rad"
@@ -474,12 +481,9 @@ class Concertina(PrescribedBody):
         if self.bumps not in (1, 2):
             raise ProblemError(f"bumps must be 1 or 2, not {self.bumps!r}.")
         widest = 0.5 / self.bumps
-        ends = {"epsilon": (widest, f"{widest:g} for {self.bumps} bump(s)"), "share": (1, "1")}
-        for name, (most, words) in (ends | {"amplitude": (np.pi / 2, "pi/2")}).items():
-            if not 0 < getattr(self, name) < most:
-                raise ProblemError(
-                    f"{name} must lie between 0 and {words}, not {getattr(self, name)!r}."
-                )
+        _check_below(widest, f"{widest:g} for {self.bumps} bump(s)", epsilon=self.epsilon)
+        _check_below(1, "1", share=self.share)
+        _check_below(np.pi / 2, "pi/2", amplitude=self.amplitude)
 
     @property
     def width(self) -> float:
@@ -623,11 +627,8 @@ class CrawlerBody(SmoothBody):
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        for name, high in (("epsilon", 0.5), ("share", 1)):
-            if not 0 < getattr(self, name) < high:
-                raise ProblemError(
-                    f"{name} must lie between 0 and {high}, not {getattr(self, name)!r}."
-                )
+        _check_below(0.5, "0.5", epsilon=self.epsilon)
+        _check_below(1, "1", share=self.share)
         check_count(12, least=2, modes=self.modes)
 
     @property

@@ -448,10 +448,9 @@ def steer(
             f"the straight gait is not verified, so there is nothing to steer: {straight.message}"
         )
     anywhere = problem.gait.with_symmetry(NONE)
-    bent = problem.joint_map is not None and any(problem.joint_map.rest)
-    mirrors = (
-        ANTIPODAL in problem.body.symmetries and not one_sided(problem.joint_limit) and not bent
-    )
+    joints = problem.joint_map
+    lopsided = one_sided(problem.joint_limit) or (joints is not None and any(joints.rest))
+    mirrors = ANTIPODAL in problem.body.symmetries and not lopsided
 
     def family(
         stated: Problem, wanted: Sequence[float], known: dict[float, Solution]

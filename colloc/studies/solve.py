@@ -45,7 +45,7 @@ from colloc.search.explore import with_reachable_distance
 from colloc.search.iterate import Iterate
 from colloc.search.solve import REDUCED
 from colloc.search.solve import solve as search_solve
-from colloc.system.arguments import check_count, shown
+from colloc.system.arguments import check_choice, check_count, shown
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import run_file
 from colloc.system.task_pool import Lost, Task, pool_for, process_pool, run_tasks
@@ -273,8 +273,7 @@ def multistart(
     """
     check_count(starts=starts, workers=workers)
     check_count(LARGEST_SEED, least=0, seed=seed)
-    if sampler not in SAMPLERS:
-        raise ProblemError(f"sampler must be one of {', '.join(SAMPLERS)}, not {shown(sampler)}.")
+    check_choice(SAMPLERS, sampler=sampler)
     if not time_limit > 0:
         raise ProblemError(f"time_limit must be positive, not {time_limit:g}.")
     problem = with_reachable_distance(_read(problem).problem)

@@ -554,11 +554,10 @@ class GaitWithInertia(_Gait):
         several states ``(n, 7)``, with the same steps."""
         if start.shape == (3,):
             start = np.append(start, [self.theta, 0.0, 0.0, 0.0])
-
-        def rates(t: float, states: np.ndarray, _: None) -> tuple[np.ndarray, None]:
-            return self.rates(t, states), None
-
-        return integrate_period(rates, start.ravel(), aim, self.breaks, jacobian=self.jacobian)
+        at = start.ravel(), aim, self.breaks
+        return integrate_period(
+            lambda t, states, _: (self.rates(t, states), None), *at, jacobian=self.jacobian
+        )
 
     def rates(self, t: float, states: np.ndarray) -> np.ndarray:
         """Rates ``(7 n,)`` of n motions' states at a phase."""

@@ -437,17 +437,23 @@ def plan_mesh(
     if match := re.fullmatch(r"(gauss|radau)-(\d+)", control.scheme):
         more = [rules[0].s + n for n in _MORE_NODES]
         rules += [scheme(f"{match[1]}-{s}") for s in more[1:] if s <= _MOST_NODES]
-    asked: Any = {"kept": knots, "tolerance": tolerance, "aim": aim}
     best: MeshPlan | None = None
 
-    def budget() -> float:
-        return most_points if best is None else min(most_points, best.points / _HANDICAP)
+    def try_rule(rule: Scheme, refine: Callable[..., Any], *start: np.ndarray) -> None:
+        """Take what a rule leads to if it is the first, or reaches the request by fewer points."""
+        nonlocal best
+        budget = most_points if best is None else min(most_points, best.points / _HANDICAP)
+        edges, estimate = refine(known, rule, *start, wanted=aim * tolerance, budget=budget)
+        plan = MeshPlan(rule.name, edges, estimate, estimate <= tolerance, knots)
+        fewer = best is None or not best.reached or plan.points * _HANDICAP < best.points
+        if best is None or (plan.reached and fewer):
+            best = plan
 
     if control.dynamics.followed:
         uniform = np.linspace(0.0, control.admissible.fraction, control.intervals + 1)
         first = np.union1d(mesh.edges if nested else uniform, knots)
         for rule in rules:
-            best = _fewest(best, _halve(known, rule, first, budget=budget(), **asked))
+            try_rule(rule, _halve, first)
         return best
     apart = _ONE_KINK * control.admissible.fraction
     kinks = kink_phases(control.dynamics.body, control.dynamics.law, gait, delta, fine, apart)
@@ -467,20 +473,14 @@ def plan_mesh(
             just_left = np.abs(nearest - kinks) < _LEFT * np.diff(mesh.edges).mean()
             targets = np.union1d(kinks, nearest[just_left])
         edges = move_knots(np.union1d(coarse, knots), targets, 0.0 if keeps else _SNAP)
-        best = _fewest(best, _split(known, rule, edges, on_knots, budget=budget(), **asked))
+        try_rule(rule, _split, edges, on_knots)
     return best
 
 
-def _fewest(best: MeshPlan | None, plan: MeshPlan) -> MeshPlan:
-    """The plan with the fewest points of those that reach the request; else the first."""
-    fewer = best is None or not best.reached or plan.points * _HANDICAP < best.points
-    return plan if best is None or (plan.reached and fewer) else best
-
-
-def _by_error(shares: np.ndarray, allowed: float) -> tuple[np.ndarray, int]:
-    """Intervals by falling error, and how many of them hold the excess over `allowed`."""
+def _by_error(shares: np.ndarray, wanted: float) -> tuple[np.ndarray, int]:
+    """Intervals by falling error, and how many of them hold most of the excess."""
     order = np.argsort(shares)[::-1]
-    return order, int((np.cumsum(shares[order]) < shares.sum() - allowed).sum())
+    return order, int((np.cumsum(shares[order]) < shares.sum() - 0.3 * wanted).sum())
 
 
 def _split(
@@ -489,19 +489,18 @@ def _split(
     edges: np.ndarray,
     kinks: np.ndarray,
     *,
-    kept: np.ndarray,
-    tolerance: float,
-    aim: float,
+    wanted: float,
     budget: float,
-) -> MeshPlan:
-    """Cut the intervals with the largest errors, in the middle or near an end that is a kink."""
+) -> tuple[np.ndarray, float]:
+    """Cut the intervals with the largest errors, in the middle or near an end that is a kink; the
+    edges and the error that is left."""
     left, right = edges[:-1], edges[1:]
     shares = interval_shares(known, rule, left, right)
     unresolved = float(known.fine.unresolved.sum())
-    wanted = max(aim * tolerance - unresolved, 0.25 * aim * tolerance)
+    wanted = max(wanted - unresolved, 0.25 * wanted)
     while shares.sum() > wanted and left.size * (rule.s - rule.left) < budget:
         # half of those that hold the excess at a time: what they leave behind is not known yet
-        order, count = _by_error(shares, 0.3 * wanted)
+        order, count = _by_error(shares, wanted)
         chosen = order[: max(1, count // 2)]
         chosen = chosen[right[chosen] - left[chosen] > 2 * _NARROWEST]
         if chosen.size == 0:
@@ -515,30 +514,21 @@ def _split(
             np.concatenate([np.delete(old, chosen), added])
             for old, added in ((left, new_left), (right, new_right), (shares, new))
         )
-    estimate = float(shares.sum() + unresolved)
-    edges = np.sort(np.append(left, right.max()))
-    return MeshPlan(rule.name, edges, estimate, estimate <= tolerance, kept)
+    return np.sort(np.append(left, right.max())), float(shares.sum() + unresolved)
 
 
 def _halve(
-    known: Known,
-    rule: Scheme,
-    edges: np.ndarray,
-    *,
-    kept: np.ndarray,
-    tolerance: float,
-    aim: float,
-    budget: float,
-) -> MeshPlan:
+    known: Known, rule: Scheme, edges: np.ndarray, *, wanted: float, budget: float
+) -> tuple[np.ndarray, float]:
     """Halve the intervals with the largest errors of a motion with states."""
     control, gait, delta, fine = known
     while True:
-        error = mesh_error(control, Mesh(rule, edges), gait, delta, tolerance, fine)
+        error = mesh_error(control, Mesh(rule, edges), gait, delta, fine=fine)
         shares = np.abs(error.value)
-        small, full = shares.sum() <= aim * tolerance, edges.size * rule.s > budget
+        small, full = shares.sum() <= wanted, edges.size * rule.s > budget
         if small or full or np.isnan(shares).any():
-            return MeshPlan(rule.name, edges, error.estimate, error.estimate <= tolerance, kept)
-        order, count = _by_error(shares, 0.3 * aim * tolerance)
+            return edges, error.estimate
+        order, count = _by_error(shares, wanted)
         chosen = order[: max(1, count)]
         chosen = chosen[shares[chosen] > _WORST * shares.max()]
         edges = np.sort(np.concatenate([edges, 0.5 * (edges[chosen] + edges[chosen + 1])]))

@@ -137,10 +137,8 @@ def changes(
 def _find_differences(panels: Panels) -> None:
     """Write to new panels, and those within reach of one, what halving them changes of `increments`
     if they lay from two instants earlier to two later; 0 where that is not known."""
-    (left, width), total = (
-        panels[:2],
-        np.append(0, np.cumsum(np.isnan(panels.differences[:, 0, 0]))),
-    )
+    left, width = panels[:2]
+    total = np.append(0, np.cumsum(np.isnan(panels.differences[:, 0, 0])))
     ends = left - _REACH * width, left + (1 + _REACH) * width
     first, last = (np.searchsorted(left, end % 1.0, side="right") - 1 for end in ends)
     within = total[last + 1] - total[first] + total[-1] * (last < first)
