@@ -57,6 +57,7 @@ READ = {
     "seconds and nanoseconds": ("stamp.sec,stamp.nanosec,q1,q2,q3\n" + table([f"{int(s) + 1000}" for s in SECONDS], [f"{round(s % 1 * 1e9)}" for s in SECONDS], A, B, C),
         "time in s"),
     "date and time": ("timestamp,joint_1,joint_2,joint_3\n" + table(STAMPS, A, B, C), "time of day, in s"),
+    "a period in seconds": ("# period_s: 4\nt_ms,q1,q2,q3\n" + table(1000 * SECONDS, A, B, C), "time in ms"),
     "no times": ("Servo1 Position,Servo2 Position,Servo3 Position\n" + table(A, B, C), "time in equal steps"),
     "counted samples, two dropped": ("seq,q1,q2,q3\n" + table(*(np.delete(each, [7, 30]) for each in (np.arange(60), A, B, C))),
         r"time in samples \(seq\)"),

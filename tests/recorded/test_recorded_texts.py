@@ -62,7 +62,7 @@ READ = {
         "STUDY = Study('none', (Axis('mu_t', (1, 2)),), lambda mu_t: Problem('no', delta=-mu_t))\n"
     ),
 }
-NAMES = "time_s,joint_1,joint_2,x,y"
+NAMES = "time_s,joint_1,joint_2,x_m,y_m"
 ALSO = {}
 
 
@@ -310,7 +310,7 @@ def folder(tmp_path_factory):
     for name, text in READ.items():
         (made / name).write_text(text, encoding="utf-8")
     time = np.arange(41) / 10
-    angles = [*LOOP.angles(time / 4), *state("loop").sample(time / 4).centre]
+    angles = [*LOOP.angles(time / 4), *(2 * state("loop").sample(time / 4).centre)]
     np.savetxt(made / "crawls.csv", np.transpose([time, *angles]), "%.6f", ",", header=NAMES)
     found = archive(made / "starts.h5")
     failed = replace(outcome(3), status="not converged", message="It did not end.")

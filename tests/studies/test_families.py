@@ -148,6 +148,12 @@ def test_a_robots_front_is_in_centimetres_a_second_and_joules_a_metre():
         assert energy == pytest.approx(battery / way, rel=1e-4)
 
 
+def test_where_the_period_is_sought_a_front_is_of_the_speed_unless_another_objective_is_stated():
+    robot = colloc.Robot(length=0.5, mass=2, period=(1, 20), idle_power=1)
+    with pytest.raises(colloc.ProblemError, match="two objectives, not speed twice"):
+        pareto_front(Problem("sought", robot=robot), None, "distance / period")
+
+
 def test_of_a_quantity_that_is_asked_for_twice_the_larger_value_counts():
     twice = PROBLEM.with_(at_least=[("distance", 0.1), ("distance", 0.2), ("work", 0.1)])
     assert [least for _, least in twice.at_least] == [0.2, 0.1]
