@@ -394,8 +394,8 @@ def _units(problem: Problem) -> dict[str, _Unit]:
             ("speed_limit", "max_speed", "rad/s"),
             ("torque_limit", "max_torque", "N m"),
         ):
-            if (limit := getattr(robot, stated)) is not None:
-                size = np.ravel(limit)[0] / np.ravel(getattr(problem, field))[0]
+            if limit := getattr(problem, field):  # not of a speed where the period is sought
+                size = np.ravel(getattr(robot, stated))[0] / np.ravel(limit)[0]
                 units[field] = _Unit(stated, text, float(size))
     return units
 

@@ -201,6 +201,8 @@ def test_an_mjcf_has_classes_degrees_and_capsules(tmp_path, capsys):
     limits = [np.degrees(np.ravel(x)).tolist() for x in problem.joint_limit]
     assert limits == [pytest.approx([100], rel=1e-5), pytest.approx([-30, 60], rel=1e-5)]
     assert "rot2 = joint_1, rot3 = joint_2" in capsys.readouterr().out
+    usual = SWIMMER.replace('<compiler angle="degree"/>', "")
+    assert read(tmp_path, usual, kind="xml").hash == problem.hash
 
 
 def test_an_mjcf_counts_angles_from_its_reference_and_the_stated_mass_of_a_body_alone(tmp_path):

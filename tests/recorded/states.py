@@ -39,6 +39,7 @@ STANDING = Chain(feet=(Foot(0), Pad(1, 0.1, 0.6), Wheel(2, 0.3, rolling=0.1)))
 ONE = Robot(length=1, mass=2, period=50, max_speed=2, max_torque=(2.5, 1.5), idle_power=0.01)
 STATED = {
     "loop": {},
+    "flat": {"guess": LOOP.scaled(0.15)},
     "limited": {
         "joint_limit": (1.6, (-1.5, 2.0)),
         "speed_limit": 14.0,

@@ -16,7 +16,7 @@ from colloc import BSpline, Chain, Fourier, Friction, Harmonic, Problem, StoreEr
 from colloc.commands.families import multistart, starts_summary
 from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.problem_file import read_problem_file
-from colloc.gaits.starts import BLOCK, SAMPLERS, on_speed_floor, start_gait
+from colloc.gaits.starts import BLOCK, SAMPLERS, largest_amplitude, on_speed_floor, start_gait
 from colloc.mechanics.contact import crossing_depth
 from colloc.results import archive as archives
 from colloc.results.archive import ERROR, TIME_LIMIT, Archive, open_archive, save_archive
@@ -96,6 +96,8 @@ def test_starts_are_admissible_members_of_their_class_and_reproducible(sampler, 
         assert np.abs(angles).max() <= 2.8
         assert not crossing_depth(stated.body, angles).any()
         assert start.shape_speed >= stated.smallest_shape_speed
+        if sampler == SAMPLERS[0]:  # from 0.2 to 0.95 of the largest
+            assert 1.05 < largest_amplitude(stated, start) < 5.01
         assert phase_distance(start, gait.member(stated.gait.parameters(start), 2)) < 1e-7
         np.testing.assert_array_equal(angles, start_gait(stated, sampler, 3, k).angles(t))
         assert np.abs(angles - start_gait(stated, sampler, 4, k).angles(t)).max() > 1e-2
