@@ -60,6 +60,12 @@ def test_pads_from_end_to_end_are_the_line(law, weights):
     np.testing.assert_allclose(own, known, rtol=1e-12, atol=1e-14)
 
 
+BENT = (
+    np.array([[0.9, -0.4, 0.3], [0.2, -1.1, 1.4]]),
+    np.array([[1.0, -0.5, 0.8], [-0.6, 1.2, 0.4]]),
+)
+
+
 def wheels_that_do_not_slip(body, angles, rates):
     """Tail velocity of one instant: no wheel moves across its rolling direction."""
 
@@ -73,14 +79,14 @@ def wheels_that_do_not_slip(body, angles, rates):
 
 
 def test_a_wheeled_snake_tends_to_its_nonholonomic_kinematics_like_rolling_over_sideways_friction():
-    angles = np.array([[0.9, -0.4, 0.3], [0.2, -1.1, 1.4]])
-    rates = np.array([[1.0, -0.5, 0.8], [-0.6, 1.2, 0.4]])
     errors = []
     for ratio in (1e2, 1e3, 1e4):
         wheel = {"rolling": 0.02, "sideways": 0.02 * ratio}
         body = Chain(feet=tuple(Wheel(link, **wheel) for link in range(3)))
-        z = solve_balance(body, EQUAL, angles, rates, 1e-9).require().z
-        known = [wheels_that_do_not_slip(body, *at) for at in zip(angles.T, rates.T, strict=True)]
+        z = solve_balance(body, EQUAL, *BENT, 1e-9).require().z
+        known = [
+            wheels_that_do_not_slip(body, *at) for at in zip(*np.swapaxes(BENT, 1, 2), strict=True)
+        ]
         errors.append(np.abs(z - np.transpose(known)).max())
     np.testing.assert_allclose(np.log10(np.divide(errors[:-1], errors[1:])), 1.0, atol=0.1)
     assert errors[-1] < 2e-3
@@ -239,11 +245,11 @@ def test_a_wheel_says_which_of_the_two_laws_it_has():
 def test_wheels_that_roll_freely_or_hold_firmly_do_not_slip(wheel):
     """To rolling over sideways friction times delta, and not times the speed: it is nonholonomic at
     any small ratio."""
-    angles = np.array([[0.9, -0.4, 0.3], [0.2, -1.1, 1.4]])
-    rates = np.array([[1.0, -0.5, 0.8], [-0.6, 1.2, 0.4]])
     body = on_axles(**wheel)
-    z = colloc.solve_balance(body, Friction(), angles, rates, 1e-3).require().z
-    known = [wheels_that_do_not_slip(body, *at) for at in zip(angles.T, rates.T, strict=True)]
+    z = colloc.solve_balance(body, Friction(), *BENT, 1e-3).require().z
+    known = [
+        wheels_that_do_not_slip(body, *at) for at in zip(*np.swapaxes(BENT, 1, 2), strict=True)
+    ]
     np.testing.assert_allclose(z, np.transpose(known), atol=1e-8)
 
 
