@@ -170,13 +170,22 @@ def test_two_links_with_reversible_friction_cannot_move():
     assert values[2] < 0.01
 
 
-def test_a_bound_says_whether_the_last_climbs_still_found_more():
+def test_a_bound_says_whether_the_last_climbs_still_found_more(monkeypatch):
+    most, climb = [], sampled.climb_from_lattice
+
+    def kept(*at, **how):
+        most.append(found := climb(*at, **how))
+        return found
+
+    monkeypatch.setattr(sampled, "climb_from_lattice", kept)
     few, enough = (
         efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(8, (1,), 64, 1, n))
         for n in (1, 24)
     )
     assert (few.converged, enough.converged) == (False, True)
     assert few.sampled > 1.05 * enough.sampled
+    # and is what a check finds that knows nothing of its samples
+    assert [each[0].max() for each in most] == [few.sampled, enough.sampled]
 
 
 @pytest.mark.slow
@@ -247,7 +256,9 @@ def test_peaks_where_one_joint_turns_alone_are_met_and_climbed_along():
 @pytest.mark.parametrize("shift", [0.0, 0.37])
 def test_lattices_hold_the_corners_between_limit_and_contact(shift):
     """A potential that had converged at 0.8609 stood at 1.0283 in such a corner."""
-    angles = Domain(Chain(), Friction(mu_t=0.5, mu_f=1, mu_b=5), 2.5).lattice(8, 6, shift).angles
+    lattice = Domain(Chain(), Friction(mu_t=0.5, mu_f=1, mu_b=5), 2.5).lattice(8, 6, shift)
+    angles, rates = lattice.angles, lattice.rates
+    assert {*rates[0, rates[1] == 0]} == {1.0, -1.0}  # joint 1 alone, both ways
     assert np.abs(angles - np.array([[2.5], [1.89109]])).sum(axis=0).min() < 1e-4
     assert np.isclose(angles.max(), 2.5)  # and the limit
 
@@ -378,4 +389,5 @@ def test_a_tighter_bound_is_offered_where_one_can_be_computed_alone(tmp_path, mo
 def test_no_bound_is_offered_of_gaits_that_turn_or_are_sought_for_something_else(changed):
     usual = Problem("usual", gait=Harmonic(1))
     assert refusal(usual) == ""
+    assert "gap 0.9000" in gap_line(usual, 0.1, None)
     assert "efficiency, on the level, of gaits that do not turn" in refusal(usual.with_(**changed))

@@ -145,8 +145,9 @@ def test_samples_without_a_trend_are_dry_friction():
 
 def test_a_few_samples_are_not_read_as_more_than_a_number_or_two():
     """Noise in three numbers would have become a law that vanishes at rest."""
-    for along in ((0.5, 0.52, 0.53), (0.5, 0.52, 0.51)):
-        law = fitted_friction(np.column_stack([[0.1, 0.2, 0.3], along, along])).law
+    for along in ((0.5, 0.52, 0.53), (0.5, 0.52, 0.51), (0.8, 0.5, 0.5, 0.5)):
+        speed = 0.1 * np.arange(1, len(along) + 1)
+        law = fitted_friction(np.column_stack([speed, along, along])).law
         assert isinstance(law, Friction)
         assert (law.mu_f, law.mu_t) == pytest.approx((np.mean(along), np.mean(along)))
 
@@ -157,6 +158,12 @@ def test_noise_is_smoothed(seed):
     true = stribeck(0.4, 0.4, 0.15)
     found = fitted_friction(table(true + noise, true + noise)).law
     assert np.sqrt(np.mean((-forces(found, SPEED, 0.0)[0] - true) ** 2)) < 0.6 * 0.02
+
+
+def test_one_direction_is_as_exact_as_its_samples_though_another_is_noise():
+    across, noise = stribeck(0.8, 0.3, 0.2), 0.02 * np.random.default_rng(4).normal(size=25)
+    law = fitted_friction(table(0.5 + noise, across)).law
+    np.testing.assert_allclose(-forces(law, SPEED, np.pi / 2)[1], across, atol=1e-4)
 
 
 def test_metres_and_seconds_are_the_same_law():

@@ -66,6 +66,26 @@ def test_the_worst_instant_moves_with_the_gait(b):
     assert found.smallest == pytest.approx(2 * b + 1, abs=1e-4)
 
 
+class Rough(Touching):
+    """Bent down within 1e-5 of y = 0 alone; with a gradient that is off, as where kinks pass a
+    point of the mesh: the Hessian has an antisymmetric part."""
+
+    def objective(self, v):
+        y, w = abs(v[1]), 1e-5
+        return super().objective(v) - (y * y if y < w else w * (2 * y - w))
+
+    def gradient(self, v):
+        off = 0.1 * np.array([v[1], 0.5 - v[0]])
+        return super().gradient(v) + off - [0.0, 2 * np.clip(v[1], -1e-5, 1e-5)]
+
+
+def test_a_bend_that_a_longer_step_does_not_see_is_no_saddle_and_an_error_is_what_it_couples():
+    found = curvature(Rough(0.25, 1.0), np.array([0.5, 0.0]))
+    assert found.smallest == pytest.approx(0.5 - 0.08, abs=0.01)
+    # of -1.5 and 2, by as much as a coupling of 0.1 moves them
+    assert found.error == pytest.approx(0.1**2 / 3.5, rel=1e-2)
+
+
 def test_the_peak_of_a_moment_moves_with_the_gait():
     """The second derivative of the largest moment over time is that at its instant and what the
     move of the instant adds."""

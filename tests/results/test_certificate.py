@@ -96,6 +96,7 @@ def test_balance_at_the_nodes(failures, three_link):
         ("balance in replay", lambda r, f: {"residual": f * 1e-6}),
         ("net rotation", lambda r, f: {"rotation": -f * 1e-4 * r.distance / r.lever}),
         ("replay error", lambda r, f: {"error": f * 1e-6}),
+        ("stability", lambda r, f: {"multipliers": (0.1, f * np.exp(2j))}),
         ("work = dissipation", lambda r, f: {"actuator_work": r.work * (1 + f * 1e-7)}),
         ("work = dissipation", lambda r, f: {"actuator_work": r.work * (1 - f * 1e-7)}),
     ],

@@ -294,6 +294,9 @@ def test_a_gait_that_turns_goes_as_far_as_its_mirror_image_which_turns_the_other
     assert other.success
     assert other.rotation == pytest.approx(-one.rotation, rel=1e-6)
     assert abs(one.rotation) > 0.3
+    little = colloc.evaluate(QUICK, colloc.Fourier([0.2003, -0.2], [[0.9], [-0.9]], [[0.5]] * 2))
+    assert little.success  # as one that turns, by 1e-3 of its way
+    assert 0 < abs(little.problem.rotation) < 1e-4
     errors = (each.certificate.errors["distance"] for each in (one, other))
     assert other.distance == pytest.approx(one.distance, abs=sum(errors))
     assert other.arc.radius == pytest.approx(one.arc.radius, rel=1e-4)

@@ -2,6 +2,7 @@
 what a motion does not tell is said."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 import colloc
 from colloc import Chain, Coupled, Foot, Fourier, Friction, Harmonic, Problem, Robot, Wheel
 from colloc.commands.main import main
-from colloc.search.evaluate import Identified
+from colloc.search.evaluate import Identified, _Fit
 
 GAIT = colloc.ellipse(A0=0.3, A1=1.6, B1=1.1)
 WAVE = Fourier([0.0, 0.0, 0.0], [[0.6], [0.3], [-0.3]], [[0.0], [0.5], [0.5]])
@@ -66,6 +67,36 @@ def test_known_coefficients_lie_within_the_errors_nineteen_times_in_twenty(crawl
     # an error is two standard deviations, so these are about a half, and 1 is rare
     assert (np.abs(off) < 1).mean() > 0.8
     assert 0.4 < np.sqrt(np.mean(np.square(off))) < 0.6  # of 24 numbers it is known to 15 %
+
+
+class Line(_Fit):
+    """Places that move by a slope times the one number, as they do with the mean of joint 1."""
+
+    def __init__(self, residuals, slope):
+        self.residuals, self.slope, self.gait = residuals, slope, GAIT
+        self.counts, self.freedom = np.array([residuals.size, 0]), residuals.size - 5.0
+        self.prior, self.noise = np.zeros((0, 1)), np.ones((2, 1))
+
+    def off(self, x, motors=None):
+        moved = x[0] + (motors or GAIT).mean[0] - GAIT.mean[0]
+        return np.array([self.residuals + moved * self.slope, 0 * self.slope])
+
+
+@pytest.mark.parametrize("lasts", [1, 8])
+def test_errors_are_those_of_residuals_that_are_independent_and_of_samples_of_angles(lasts):
+    rng, n = np.random.default_rng(0), 400
+    slope, noise = rng.normal(size=(3, n)), rng.normal(size=(3, n // lasts)).repeat(lasts, axis=1)
+    fit = Line(0.1 * noise, slope)
+    x = fit.best(np.zeros(1))
+    square = (fit.off(x)[0] ** 2).sum() / fit.freedom
+    assert fit.noise[0, 0] == pytest.approx(square**0.5, rel=1e-3)
+    alike, covariance = fit.covariance(x, None)
+    assert 0.5 * lasts < alike < 2 * lasts
+    assert covariance.item() == pytest.approx(alike * square / (slope**2).sum(), rel=1e-3)
+    fit.noise, one = np.full((2, 1), square**0.5), np.zeros((1, 2, 3))
+    one[0, 0, 0] = 0.05  # two standard deviations of it are in proportion
+    _, more = fit.covariance(x, SimpleNamespace(directions=one, richer=None))
+    assert (more - covariance).item() == pytest.approx(0.05**2, rel=1e-3)
 
 
 @pytest.mark.slow
