@@ -3,7 +3,7 @@ with colloc.
 
 The closed forms of `colloc.mechanics.friction` are arranged to lose no digits; these are not:
 they are what an integral table says (asinh), and digits are bought with precision instead.
-`quadrature_moments` checks them by quadrature.
+`benchmarks.independent_replay` has the same forces in a program of its own.
 """
 
 from __future__ import annotations
@@ -34,31 +34,6 @@ def link_moments(
         k1 = r1 - r0
         k2 = (y1 * r1 - y0 * r0 - a2 * k0) / 2
         return k0 / w, (k1 - vn * k0) / w**2, (k2 - 2 * vn * k1 + vn * vn * k0) / w**3
-
-
-def quadrature_moments(
-    vs: float, vn: float, w: float, length: float, delta: float
-) -> tuple[mp.mpf, ...]:
-    """The same by tanh-sinh quadrature on panels that halve towards the slowest point of the
-    link."""
-    with mp.workdps(30):
-        half = mp.mpf(length) / 2
-        slowest = min(max(-mp.mpf(vn) / mp.mpf(w), -half), half) if w else mp.mpf(0)
-        steps = [half * 2 * mp.mpf(2) ** -k for k in range(0, 60, 2)]
-        edges = sorted(
-            {-half, half, slowest}
-            | {e for s in steps for e in (slowest - s, slowest + s) if -half < e < half}
-        )
-
-        def integral(order: int) -> mp.mpf:
-            return mp.quad(
-                lambda s: (
-                    s**order / mp.sqrt(mp.mpf(vs) ** 2 + (vn + w * s) ** 2 + mp.mpf(delta) ** 2)
-                ),
-                edges,
-            )
-
-        return tuple(integral(order) for order in range(3))
 
 
 def _digits(*values: float) -> int:

@@ -258,16 +258,3 @@ def test_more_knots_lower_the_program(found):
     assert more.intervals == 6
     assert more.graded
     assert more.floor < found[1].floor - 1e-3
-
-
-def test_graded_splines_hold_every_cubic_exactly():
-    spline = TensorSpline(1, LIMIT, 6, (-1.9, -1.2, 0.0, 1.2, 1.9))
-    angles = np.linspace(-LIMIT, LIMIT, 200)[None]
-
-    def cubic(x):
-        return 1 - 2 * x + 0.3 * x**2 - 0.7 * x**3
-
-    matrix, change = (each.toarray() for each in spline.matrices(angles, np.ones_like(angles)))
-    coefficients = np.linalg.lstsq(matrix, cubic(angles[0]), rcond=None)[0]
-    assert np.allclose(matrix @ coefficients, cubic(angles[0]), atol=1e-10)
-    assert np.allclose(change @ coefficients, -2 + 0.6 * angles - 2.1 * angles**2, atol=1e-9)

@@ -31,8 +31,9 @@ def functions(spline, q):
     return spline.matrices(q, 0.0 * q)[0]
 
 
-def test_splines_add_up_to_one_and_differentiate():
-    spline = TensorSpline(2, np.pi, 5)
+@pytest.mark.parametrize("graded", [(), (-2.0, -0.7, 0.7, 2.0)])
+def test_splines_add_up_to_one_and_differentiate(graded):
+    spline = TensorSpline(2, np.pi, 5, graded)
     q, r = random_points(1, 50)
     q *= 0.99
     coefficients = np.random.default_rng(2).standard_normal(spline.size)

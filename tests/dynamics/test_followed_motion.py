@@ -17,6 +17,7 @@ from colloc.reduced.program import ReducedProgram
 from colloc.search.confirm import Solver, confirm
 from colloc.search.iterate import evaluate_at, space_near
 from colloc.verification.adaptive_motion import fine_motion
+from colloc.verification.mesh_error import kink_phases
 from tests.shared.cases import slow
 from tests.shared.mechanics import coulomb
 
@@ -57,6 +58,14 @@ def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
     ].mean(axis=1)
     assert turns < found.others["rotation"] < 1.2 * turns
     assert found.others["distance"] > moves + turns * found.distance
+
+
+def test_where_a_branch_ends_the_body_jumps_and_a_mesh_has_a_knot():
+    at, t = (BODY, coulomb(10, 1, 1), random_path(2), 1e-4), np.linspace(0.37, 0.38, 2001)
+    several = all_balanced_velocities(*at[:2], *at[2](t), 1e-4).number > 1
+    (end,) = t[np.flatnonzero(several[:-1] & ~several[1:])]
+    kinks = kink_phases(*at, fine_motion(*at, np.linspace(0, 1, 61), 1e-6))
+    assert np.abs(kinks - end).min() < 1e-4
 
 
 def test_the_replay_follows_the_branch_in_time_and_against_it_as_if_the_gait_were_reversed():

@@ -11,7 +11,7 @@ import scipy.integrate
 from scipy.integrate import solve_ivp
 
 from colloc import Chain, Fourier, Friction, NotConvergedError
-from colloc.dynamics.collocated import CollocatedPose, heading
+from colloc.dynamics.collocated import heading
 from colloc.dynamics.dynamics import OnSlope, Shapes
 from colloc.dynamics.states import CollocatedStates, Rates
 from colloc.gaits.gait import ANTIPODAL, BILATERAL, NONE
@@ -111,18 +111,6 @@ def test_a_slow_motion_down_a_steep_slope_is_found_where_steps_run_out_of_what_b
     assert along.held.all()
     turned = slow.equations(mesh).integrals(along.now.z[2:])[0]
     np.testing.assert_allclose(along.states, 3.0 + turned, atol=1e-9)
-
-
-@pytest.mark.parametrize("name", ["gauss-3", "radau-2", "trapezoid", "hermite-simpson"])
-def test_a_body_that_turns_and_moves_steadily_goes_round_a_circle(name):
-    """theta = w t, and the centre of mass lies at v (e^(i w t) - 1) / (i w)."""
-    w, v = 0.8, 0.3 + 0.1j
-    fine = np.linspace(0, 1, 400)
-    mesh = Mesh(scheme(name), fine)
-    rates = np.full(mesh.n_point, w), np.full((2, mesh.n_point), [[v.real], [v.imag]])
-    found = CollocatedPose.on_mesh(mesh, *rates)
-    np.testing.assert_allclose(found.theta, w * fine, atol=1e-12)
-    np.testing.assert_allclose(found.place, v * (np.exp(1j * w * fine) - 1) / (1j * w), atol=1e-6)
 
 
 def test_a_gait_goes_where_its_whole_period_leads():

@@ -299,21 +299,6 @@ def test_purcells_square_stroke_goes_as_far_as_an_independent_integration_says(a
     assert state[2] == pytest.approx(measured.rotation, abs=1e-8)
 
 
-def test_the_path_decides_how_far_a_viscous_body_goes_and_the_pace_what_it_costs():
-    gait = colloc.ellipse(0.2, 0.9, 0.7)
-
-    def at_pace(wobble):
-        def path(t):
-            phase = t + wobble * np.sin(2 * np.pi * t) / (2 * np.pi)
-            return gait.angles(phase), gait.rates(phase) * (1 + wobble * np.cos(2 * np.pi * t))
-
-        return replay(Chain(), LAW, path, 1e-4, instants=160, tolerance=1e-9)
-
-    even, uneven = at_pace(0.0), at_pace(0.6)
-    assert uneven.distance == pytest.approx(even.distance, rel=1e-8)
-    assert uneven.work > 1.1 * even.work
-
-
 @pytest.fixture(scope="module")
 def purcell():
     return solve(colloc.load_problem(ROOT / "problems/purcell.py"), 1)

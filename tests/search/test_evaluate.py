@@ -9,6 +9,7 @@ import pytest
 import colloc
 from colloc.commands.main import main
 from colloc.gaits.fitted_gait import fitted_gait
+from colloc.search.evaluate import with_motors
 
 GAIT = colloc.Fourier([0.2, -0.1], [[0.9, 0.1], [0.3, 0.0]], [[0.0, 0.1], [0.8, -0.1]])
 PROBLEM = colloc.Problem("mine", delta=1e-3)
@@ -37,6 +38,12 @@ def test_it_is_what_a_replay_of_the_angles_says(evaluated):
     assert {"replay gap", "mesh error", "self-contact"} <= checked
     assert not {"KKT error", "second order"} & checked
     assert evaluated.standing == ["none: the gait was given"]
+
+
+def test_delta_at_unit_shape_speed_becomes_that_of_the_gait_in_a_period():
+    stated, _ = with_motors(PROBLEM.with_(gait=colloc.Polygon(4)), GAIT)
+    speed = np.sqrt((GAIT.rates(T) ** 2).sum(axis=0).mean())
+    assert stated.delta == pytest.approx(1e-3 * speed)
 
 
 LINKS = (0.3, 0.45, 0.25)

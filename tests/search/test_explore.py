@@ -165,6 +165,15 @@ def test_with_a_little_inertia_one_start_leads_to_what_many_lead_to_in_slow_moti
     assert {each.best.problem.froude for each in shown if each.best} == {1e-4}
 
 
+def test_in_slow_motion_the_work_is_that_against_friction_and_motors_have_no_limits():
+    asked = {"objective": "driven efficiency", "torque_limit": 0.1, "gait": Harmonic(1)}
+    fast = Problem("fast", froude=0.1, **asked)
+    slow = explore.in_slow_motion(fast)
+    said = slow.froude, slow.objective.name, slow.path_limits.names
+    assert said == (0.0, "efficiency", ())
+    assert explore.in_slow_motion(fast.with_(grade=0.1)) is None
+
+
 @pytest.mark.parametrize(
     ("ends", "solved_for"),
     [

@@ -100,13 +100,6 @@ def test_errors_are_those_of_residuals_that_are_independent_and_of_samples_of_an
 
 
 @pytest.mark.slow
-def test_noise_of_places_that_lasts_tells_less(crawled, tmp_path):
-    paths = (recorded(tmp_path / f"{n}.csv", crawled, lasts=n) for n in (1, 8))
-    once, long = (colloc.identify(FLOOR, path).coefficients["mu_t"][1] for path in paths)
-    assert long > 2 * once
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("point", ["head_", "tail_"])
 def test_any_point_of_the_body_and_its_direction_will_do_in_metres_too(crawled, tmp_path, point):
     path = recorded(tmp_path / "a.csv", crawled, noise=1e-6, point=point, length=0.6)

@@ -217,9 +217,12 @@ def test_planned_meshes_are_as_accurate_as_they_say(name):
 def test_a_nested_mesh_has_every_knot_of_the_one_before():
     stated = problem("gauss-3")
     edges = control_problem(stated).mesh().edges
-    plan, free = (planned(stated, nested=nested) for nested in (True, False))
+    plan, free = (
+        planned(stated, nested=nested, kept=np.array([0.123])) for nested in (True, False)
+    )
     assert np.isin(edges, plan.edges).all()
     assert not np.isin(edges, free.edges).all()
+    assert 0.123 in free.edges  # as it has to be
     assert plan.reached
     mesh = Mesh(scheme(plan.scheme), plan.edges)
     assert error_of(stated, mesh, tolerance=1e-7).estimate <= 1.1e-6

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, root
+from scipy.optimize import root
 
 import colloc
 from colloc import Chain, Corners, Foot, Fourier, Friction, Wheel, replay, slope_motion
@@ -13,7 +13,6 @@ from tests.shared.mechanics import coulomb, wrench
 
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
 """A gait without any symmetry."""
-ANTIPODAL = Fourier([0.0, 0.0], [[1.5], [0.0]], [[0.0], [1.0]])
 UNEQUAL = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 LOPSIDED = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 ON_FEET = Chain(
@@ -121,29 +120,6 @@ def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
     assert abs(half[0] - half[1]) > 1e-2
 
 
-@pytest.mark.slow
-def test_an_antipodal_gait_settles_along_the_fall_line():
-    """Of two headings that a period does not turn, others approach one and leave the other."""
-
-    def period(heading, periods=1):
-        at = Chain(), Friction(), ANTIPODAL, 0.05, 0.1
-        return slope_motion(*at, heading=heading, periods=periods, tolerance=1e-4)
-
-    lasting = [
-        period(brentq(lambda heading: period(heading).turn, h - 0.5, h + 0.5, xtol=1e-4))
-        for h in (0.0, np.pi)
-    ]
-    assert sorted(ran.stable for ran in lasting) == [False, True]
-    for ran in lasting:
-        assert abs(ran.turn) < 1e-3
-        assert abs(ran.aside[0]) < 1e-3  # its halves are mirror images
-        assert abs(ran.climb[0]) > 1e-2
-    (settled,) = (ran for ran in lasting if ran.stable)
-    left = period(settled.headings[0] + 0.3, 4).headings - settled.headings[0]
-    np.testing.assert_allclose(left[1:] / left[:-1], settled.steering[0], atol=3e-3)
-    assert left[-1] < 0.9 * left[0]
-
-
 def test_the_steering_is_the_slope_of_the_map():
     ends = [
         slope_motion(Chain(), Friction(), SKEW, 0.1, 0.4, heading=0.5 + s, tolerance=1e-7)
@@ -188,4 +164,5 @@ def test_a_replay_on_a_slope_says_for_which_part_of_the_time_its_motion_is_open(
         parts = np.append(getattr(first, name), getattr(then, name))
         np.testing.assert_allclose(getattr(both, name), parts, atol=1e-3)
     assert both.turn == pytest.approx(first.turn + then.turn, abs=1e-3)
-    assert replace(both, steering=np.array([0.5, 1.5])).stable  # three quarters are left of both
+    for last in (1.9, 2.1):  # half of that is left of both
+        assert replace(both, steering=np.array([0.5, last])).stable == (last < 2)
