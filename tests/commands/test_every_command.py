@@ -30,6 +30,7 @@ def place(three_link, tmp_path, monkeypatch):
     save(three_link, tmp_path / "good.h5")
     (tmp_path / "folder.py").mkdir()
     texts = {"text.h5": "hello", "fails.py": "1 / 0\n", "empty.py": "x = 1\n", "study.py": STUDY}
+    texts["wave.py"] = PROBLEM.replace("gait=Harmonic(1, 'bilateral')", "body=Wave('sine')")
     four = PROBLEM.replace("gait", "body=Chain((0.25,) * 4), gait")
     for name, text in {**texts, "problem.py": PROBLEM, "four.py": four}.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
@@ -67,6 +68,8 @@ multistart | nope.py | fails.py | problem.py --workers 0 | problem.py --sampler 
 multistart problem.py --starts 0 -> --starts must be at least 1
 multistart problem.py --time-limit 0 -> --time-limit must be positive, not 0
 multistart | problem.py --seed -1 | problem.py --time-limit nan
+multistart wave.py --quiet -> prescribed motion
+pareto wave.py -> prescribed motion
 multistart | nope.h5 | text.h5 | good.h5 --start 1 | problem.py --start 1
 multistart good.h5 -> good.h5 is no archive of starts, or good.sqlite, which holds its rows, is not beside it
 sweep | fails.py | problem.py | study.py --workers 0 | study.py --workers x

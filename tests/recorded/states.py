@@ -5,37 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from colloc import (
-    Chain,
-    Coupled,
-    Elliptic,
-    Foot,
-    Fourier,
-    Free,
-    Friction,
-    Harmonic,
-    ModalBody,
-    Pad,
-    Problem,
-    Robot,
-    Solution,
-    Viscous,
-    Wheel,
-    ellipse,
-    evaluate,
-)
+import colloc
+from colloc import Chain, Fourier, Friction, Harmonic, Problem, Robot, Solution, Viscous
 from colloc.results.answer import Alternative
 from colloc.results.checks import Certificate, Check
 from tests.conftest import guess_in_balance
 
-LOOP = ellipse(0.0, 1.2, 0.8)
+LOOP = colloc.ellipse(0.0, 1.2, 0.8)
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
 LEANING = Fourier([0.1, -0.1], [[1.2], [0.1]], [[0.0], [-0.8]], theta=0.3)
 SWUNG = Fourier([0.1, 0.2], [[0.0, 0.0], [0.5, 0.0]], [[1.0, 0.25], [0.4, 0.0]])
 LAG = 0.4 * np.pi * np.arange(4)[:, None]
 RUNNING = Fourier(np.zeros(4), 1.2 * np.cos(LAG), 1.2 * np.sin(LAG))
 UNEQUAL = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
-STANDING = Chain(feet=(Foot(0), Pad(1, 0.1, 0.6), Wheel(2, 0.3, rolling=0.1)))
+STANDING = Chain(feet=(colloc.Foot(0), colloc.Pad(1, 0.1, 0.6), colloc.Wheel(2, 0.3, rolling=0.1)))
 ONE = Robot(length=1, mass=2, period=50, max_speed=2, max_torque=(2.5, 1.5), idle_power=0.01)
 STATED = {
     "loop": {},
@@ -55,7 +38,7 @@ STATED = {
     "brakes": {"gait": Harmonic(2), "froude": 0.5, "guess": SWUNG},
     "stuck": {
         "body": Chain((0.2, 0.3, 0.3, 0.2)),
-        "gait": Coupled(Harmonic(1), stuck={1: 0.4}),
+        "gait": colloc.Coupled(Harmonic(1), stuck={1: 0.4}),
         "robot": replace(ONE, period=60, max_torque=1.5, backlash=1.5),
     },
     "feet": {"body": STANDING, "guess": SKEW, "friction": UNEQUAL},
@@ -71,14 +54,18 @@ STATED = {
         "friction": Friction(mu_t=10.0),
         "guess": RUNNING,
     },
-    "climb": {"grade": 0.05, "guess": LEANING, "friction": Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0)},
+    "climb": {
+        "grade": 0.05,
+        "guess": LEANING,
+        "friction": colloc.Elliptic(mu_t=2.0, mu_f=1.0, mu_b=1.0),
+    },
     "pace": {
-        "froude": Free(0.01, 0.5),
+        "froude": colloc.Free(0.01, 0.5),
         "objective": "distance / (work + 0.1 * period)",
         "guess": Fourier([0.1, 0.2], [[0.0], [0.5]], [[1.0], [0.4]], log_period=0.5 * np.log(100)),
     },
     "waves": {
-        "body": ModalBody(2, panels=4),
+        "body": colloc.ModalBody(2, panels=4),
         "friction": Friction(mu_t=3.0),
         "gait": Harmonic(1, "antipodal"),
         "guess": Fourier([0.0, 0.0], [[0.6], [0.0]], [[0.0], [0.5]]),
@@ -124,7 +111,7 @@ def _made(name: str) -> Solution:
     how = {"gait": Harmonic(1), "delta": 1e-2} | STATED[name]
     gait = how.pop("guess", LOOP)
     if name not in GUESSES:
-        measured = evaluate(Problem(name, **how), gait)
+        measured = colloc.evaluate(Problem(name, **how), gait)
         known = measured.certificate
         farther = known.values | {"distance": known.distance * (1 + (name == "wrong"))}
         return replace(measured, certificate=replace(known, values=farther))

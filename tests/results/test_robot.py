@@ -10,17 +10,7 @@ import pandas
 import pytest
 
 import colloc
-from colloc import (
-    Fourier,
-    Friction,
-    Harmonic,
-    Objective,
-    Problem,
-    ProblemError,
-    evaluate,
-    slope_motion,
-    solve,
-)
+from colloc import Fourier, Friction, Harmonic, Objective, Problem, ProblemError, evaluate, solve
 from colloc.gaits.objective import DRIVEN
 from colloc.results.motion import arc
 from colloc.results.robot import RobotSheet, in_si
@@ -265,7 +255,7 @@ def test_a_gait_goes_the_way_it_is_asked_to_on_a_slope_and_its_distance_is_that_
     assert towards_left.distance == pytest.approx(np.hypot(ahead, aside), rel=1e-3)
     stated, gait = towards_left.problem, towards_left.gait
     at = stated.body, stated.friction, gait, stated.delta, stated.grade
-    followed = slope_motion(*at, theta=gait.theta)
+    followed = colloc.slope_motion(*at, theta=gait.theta)
     way = towards_left.distance * np.array([np.cos(0.5), np.sin(0.5)])
     assert [followed.climb[0], followed.aside[0]] == pytest.approx(way, rel=1e-3)
 

@@ -19,7 +19,6 @@ import colloc
 from colloc import Axis, Chain, Fourier, Friction, Harmonic, Problem, ProblemError, Study, ellipse
 from colloc.commands.families import sweep as sweep_study
 from colloc.commands.families import sweep_summary
-from colloc.commands.main import main as colloc_main
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.linear import Combination
@@ -493,9 +492,7 @@ def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     out = tmp_path / "out put"
     words = [str(study_file(tmp_path)), "--output", str(out)]
     assert sweep_study(words) == 0
-    printed = capsys.readouterr().out
-    assert "2 cells, 0 of them in the journal" in printed
-    assert "2 of 2, 0 s left" in printed
+    assert "2 cells, 0 of them in the journal" in capsys.readouterr().out
     table = load_study(out / "tiny.nc").variables
     # the isotropic optimum of problems/three_link.py at a delta a hundred times larger
     assert table["efficiency"][0, 0] == pytest.approx(0.2600, abs=2e-3)
@@ -559,10 +556,3 @@ def test_gaits_of_modes_travel_and_prescribed_motions_do_not(text, least, tmp_pa
     assert study["efficiency"][0] > study["efficiency"][1] > least  # friction sideways helps
     if text == PRESCRIBED:
         assert study["starts"].tolist() == [1, 1]
-
-
-@pytest.mark.parametrize("command", ["multistart", "pareto"])
-def test_what_needs_free_gaits_refuses_a_prescribed_motion_in_words(tmp_path, capsys, command):
-    (tmp_path / "wave.py").write_text(PRESCRIBED)
-    assert colloc_main([command, str(tmp_path / "wave.py"), "--output", f"{tmp_path}/"]) == 2
-    assert "prescribed motion" in capsys.readouterr().err

@@ -113,11 +113,6 @@ def returned(path, value):
         return array(file, "value"), attribute(file, "value")
 
 
-@pytest.mark.parametrize("value", TEXTS)
-def test_texts_round_trip(tmp_path, value):
-    assert returned(tmp_path / "x.h5", value) == (value, value)
-
-
 CHARACTERS = st.characters(exclude_categories=["Cs"])
 FIXTURES = [HealthCheck.function_scoped_fixture]
 
@@ -129,11 +124,11 @@ def test_lists_of_texts_round_trip_but_for_trailing_nuls(tmp_path, values):
         assert found.tolist() == [value.rstrip("\0") for value in values]
 
 
-@pytest.mark.parametrize(
-    "value",
-    [True, 3, -2.5, [1.0, np.nan], [[1, 2]], [True, False], np.zeros((0, 2)), np.float32(0.5)],
-)
-def test_numbers_round_trip_with_their_types(tmp_path, value):
+NUMBERS = True, 3, -2.5, [1.0, np.nan], [[1, 2]], [True, False], np.zeros((0, 2)), np.float32(0.5)
+
+
+@pytest.mark.parametrize("value", [*TEXTS, *NUMBERS])
+def test_texts_and_numbers_round_trip_with_their_types(tmp_path, value):
     for found in returned(tmp_path / "x.h5", value):
         np.testing.assert_array_equal(found, value)
         assert np.shape(found) == np.shape(value)
