@@ -43,12 +43,9 @@ class Outline(HTMLParser):
         if tag not in VOID:
             self.open.append(tag)
 
-    def handle_startendtag(self, tag, attrs):
-        self.attributes += [(tag, name, value) for name, value in attrs]
-
     def handle_endtag(self, tag):
-        assert self.open, f"</{tag}> closes nothing"
-        assert self.open.pop() == tag
+        assert tag in VOID or self.open, f"</{tag}> closes nothing"
+        assert tag in VOID or self.open.pop() == tag
 
     def handle_data(self, data):
         (self.scripts if self.open and self.open[-1] == "script" else self.text).append(data)
@@ -187,7 +184,9 @@ def turning(unsolved):
 
 
 def test_the_page_of_a_turning_gait_states_angle_and_radius_and_claims_no_straight_way(turning):
-    text = re.sub(r"\s+", " ", " ".join(outline(report_page(turning)).text))
+    page = report_page(turning)
+    text = re.sub(r"\s+", " ", " ".join(outline(page).text))
+    assert 'name="mu_t" min="0.1" max="7.5" step="any" value="1.5"' in page
     words = f"turns {abs(np.degrees(turning.rotation)):.4g}° "
     assert f"{np.degrees(turning.rotation):+.2f}° turned a cycle" in text
     assert f"{turning.turning_radius:.4g} radius of the circle it crawls" in text

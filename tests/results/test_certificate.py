@@ -131,24 +131,17 @@ def test_closure(failures, three_link, monkeypatch, joint, sign):
     judged("closure", run)
 
 
-def test_joint_limits_are_those_of_the_problem(failures, three_link):
-    largest = np.abs(three_link.gait.angles(np.linspace(0, 1, 20001))).max()
-
-    def run(f):
-        tight = three_link.problem.with_(joint_limit=largest - f * 1e-6)
-        return failures(with_answer(three_link, problem=tight))
-
-    judged("joint limits", run)
-
-
-def test_joint_speeds_are_those_of_the_problem(failures, three_link):
-    fastest = np.abs(three_link.gait.rates(np.linspace(0, 1, 20001))).max()
-
-    def run(f):
-        tight = three_link.problem.with_(speed_limit=fastest / (1 + f * 1e-4))
-        return failures(with_answer(three_link, problem=tight))
-
-    judged("joint speed", run)
+@pytest.mark.parametrize(
+    ("name", "of", "tight"),
+    [
+        ("joint limits", "angles", lambda most, f: {"joint_limit": most - f * 1e-6}),
+        ("joint speed", "rates", lambda most, f: {"speed_limit": most / (1 + f * 1e-4)}),
+    ],
+)
+def test_limits_are_those_of_the_problem(failures, three_link, name, of, tight):
+    most = np.abs(getattr(three_link.gait, of)(np.linspace(0, 1, 20001))).max()
+    stated = three_link.problem.with_
+    judged(name, lambda f: failures(with_answer(three_link, problem=stated(**tight(most, f)))))
 
 
 def test_a_least_value_is_missed_by_no_more_than_a_mesh_may_err(failures, three_link, replays):

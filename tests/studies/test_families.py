@@ -15,6 +15,7 @@ from colloc import Chain, Friction, Harmonic, Objective, Problem, load, pareto_f
 from colloc.commands.main import main
 from colloc.gaits.fitted_gait import fitted_gait
 from colloc.pictures.figure import plot_front, plot_steering
+from colloc.results.robot import in_si
 from colloc.search.solve import solve
 from colloc.studies.families import Gap, ParetoFront, Steering
 
@@ -142,6 +143,7 @@ def test_a_robots_front_is_in_centimetres_a_second_and_joules_a_metre():
         assert speed == pytest.approx(100 * way / 40, rel=1e-5)
         battery = unit * measured.values["driven_work"] + 0.02 * 40
         assert energy == pytest.approx(battery / way, rel=1e-4)
+        assert in_si(point)["mean_battery_power_W"] == pytest.approx(battery / 40, rel=1e-4)
 
 
 def test_where_the_period_is_sought_a_front_is_of_the_speed_unless_another_objective_is_stated():

@@ -319,7 +319,10 @@ def test_more_starts_than_memory_holds_begin_at_once_one_by_one(tmp_path, capsys
 def test_a_start_that_fails_on_its_way_is_told_with_the_last_optimum_it_came_through(monkeypatch):
     problem = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2, intervals=10)
 
+    begun = []
+
     def stopped(*asked, **how):
+        begun.append(asked[0].guess)
         solution = solve(*asked, **how)
         assert len([step for step in solution.history if step.optimal]) > 1
         answer = replace(solution.answer, optimal=False)
@@ -330,3 +333,5 @@ def test_a_start_that_fails_on_its_way_is_told_with_the_last_optimum_it_came_thr
     assert found.status not in (ERROR, SOLVED)
     assert found.delta == problem.delta
     assert found.efficiency > 0.2
+    campaign.reopen(problem, found)  # from where it had begun
+    assert begun[1] == found.guess != found.gait
