@@ -19,7 +19,6 @@ from colloc import Chain, Friction, solve_balance
 from colloc.mechanics.balance import instant, net_force, total_power
 from colloc.mechanics.native_kernel import native_kernel
 from research.guarantee.loaded_balance import loaded_balance
-from scripts.models.static_friction import SYMMETRIC_CASES, WORKED_CASES
 from tests.shared.cases import slow_but
 from tests.shared.mechanics import coulomb, numpy_instead
 
@@ -60,19 +59,6 @@ def test_every_hard_instant_against_the_reference(coefficients, delta):
     solved = solve_balance(BODY, coulomb(*coefficients), ANGLES, RATES, delta)
     found = errors(coefficients, delta, solved)
     assert max(found.values()) < 1e-10 * max(coefficients) / min(coefficients), found
-
-
-@pytest.mark.parametrize("case", [*WORKED_CASES, *SYMMETRIC_CASES], ids=lambda c: c.name)
-def test_at_stick_the_velocity_tends_to_its_limit_linearly_in_delta(case):
-    angles, rates = np.array(case.angles)[:, None], np.array(case.rates)[:, None]
-    z = [
-        solve_balance(BODY, Friction(), angles, rates, delta).require().z
-        for delta in (1e-4, 1e-5, 1e-6, 1e-13)
-    ]
-    away = [np.abs(value - z[-1]).max() for value in z[:-1]]
-    assert away[0] < 1e-2
-    for coarse, fine in itertools.pairwise(away):
-        assert 5 < coarse / fine < 20
 
 
 @pytest.mark.parametrize("coefficients", COEFFICIENTS, ids=str)

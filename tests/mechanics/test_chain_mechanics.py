@@ -1,6 +1,5 @@
 """Chains that lie or stand, against points, differences, NumPy and CasADi."""
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -147,23 +146,6 @@ def test_the_kernel_says_what_numpy_and_casadi_say(law, body, delta, size):
     np.testing.assert_allclose(motion.actuator_power, known.actuator_power, atol=1e-9)
     scale = np.abs(reference).max(axis=(0, 1))
     np.testing.assert_allclose(slopes / scale, reference / scale, rtol=0, atol=1e-8)
-
-
-@pytest.mark.parametrize("law", [LAWS[1], LAWS[4]], ids=["unequal", "power"])
-@each_body
-def test_casadi_says_the_same(law, body):
-    angles, rates = random_instants(1, n_joint=body.n_joint)
-    rng, n_force = np.random.default_rng(3), len(body.contact.force_names)
-    given = angles, rates, *(rng.normal(size=(n, 1)) for n in (3, n_force)), np.array([[0.01]])
-    symbols = [ca.SX.sym("x", len(part)) for part in given]
-
-    def said(q, r, z, f, delta):
-        moments = joint_moments(body, q, f)
-        return [moments, *body.sliding(law, q, r, z, delta), body.forces(law, q, r, z, delta)]
-
-    symbolic = ca.Function("f", symbols, said(*symbols))(*given)
-    for own, theirs in zip(symbolic, said(*given), strict=True):
-        np.testing.assert_allclose(np.array(own), theirs, rtol=1e-11, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", ["weights", "offset"])

@@ -266,6 +266,26 @@ def test_other_motions_count_as_error_and_explain_gaps(failures, three_link, rep
     assert known.efficiency_error >= 1e-3 * fine.lever / known.work
 
 
+def test_a_certificate_says_how_far_a_body_leans_and_on_a_slope_how_long_its_motion_is_open(
+    three_link, replays
+):
+    fine, gait = replace(replays[max(replays)], several=0.3), three_link.gait
+
+    def values(**changes):
+        at = three_link.problem.with_(**changes), gait, fine, np.empty(0), 1e-6, None
+        return {name: value for name, value, *_ in verify._rows(*at)}
+
+    assert values(grade=0.1)["one motion"] == 0.3
+    body, angles = Chain(masses=(0.2, 0.6, 0.2)), gait.angles(np.linspace(0, 1, 2001))
+    assert values(body=body)["statics"] == pytest.approx(body.imbalance(angles).max(), rel=1e-4)
+
+
+@pytest.mark.parametrize(("rotation", "trivial"), [(0.0, True), (-0.1, False)])
+def test_a_gait_that_turns_on_the_spot_is_not_trivial(rotation, trivial):
+    answer = SimpleNamespace(problem=Problem("x"), efficiency=1e-6, rotation=rotation)
+    assert verify.is_trivial(answer) == trivial
+
+
 def test_a_saddle_is_not_certified_and_said_to_be_one(failures, three_link):
     """Curvature over the objective, less its error; a tenth of a radian gains that much."""
 

@@ -414,27 +414,6 @@ def test_collocation_finds_the_maximum_of_a_grid_sweep(name, around, width, solv
     assert abs(solution.certificate.efficiency - reference.efficiency) < reference.tolerance
 
 
-@pytest.mark.slow
-def test_with_slow_joints_it_is_the_maximum_over_ellipses_that_are_small_enough():
-    """Joints of one harmonic of amplitude a are at most 2 pi a fast: all that is swept is (A0, a,
-    B1 / A1)."""
-    speed = 12.0
-    solution = colloc.solve(Problem("slow", gait=Harmonic(1, "bilateral"), speed_limit=speed), 4)
-    centre, width = np.array([0.0, 0.8, 0.8]), np.array([1.5, 0.2, 0.7])
-    while width[0] > 0.01:
-        steps = np.linspace(-1, 1, 7)
-        grid = centre + width * np.stack(np.meshgrid(*[steps] * 3), axis=-1).reshape(-1, 3)
-        grid[:, 1] = np.minimum(grid[:, 1], 1.0)
-        a, turn = grid[:, 1] * speed / (2 * np.pi), grid[:, 2]
-        ellipses = np.column_stack([grid[:, 0], a * np.cos(turn), a * np.sin(turn)])
-        value = efficiencies(ellipses, 240)
-        best = int(np.argmax(value))
-        centre, width = grid[best], 0.5 * width
-    assert centre[1] == 1.0
-    value = efficiencies(ellipses[[best]], 960)[0]
-    assert solution.certificate.efficiency == pytest.approx(value, rel=1e-4)
-
-
 def test_between_points_of_a_mesh_less_is_allowed_to_both_sides():
     limits = {"torque_limit": 0.05, "power_limit": 1.0}  # joints brake with any power
     stated = USUAL.with_(guess=colloc.ellipse(0.0, 2.0, 1.3), intervals=8, delta=1e-3, **limits)

@@ -17,6 +17,7 @@ from colloc.search import explore
 from colloc.search import solve as stages
 from colloc.search.checkpoint import Run
 from colloc.search.explore import multistart, small_loops
+from colloc.search.optimise import regularisation_dominated
 from colloc.search.solve import solve
 from tests.shared.cases import slow
 
@@ -163,6 +164,16 @@ def test_with_a_little_inertia_one_start_leads_to_what_many_lead_to_in_slow_moti
         )
     assert fast < 0.99 * slow
     assert {each.best.problem.froude for each in shown if each.best} == {1e-4}
+
+
+@pytest.mark.parametrize(("drier", "is_lost"), [(-0.4, True), (-0.6, False), (np.nan, True)])
+def test_a_gait_that_loses_half_of_its_value_as_delta_falls_owed_it_to_delta(
+    monkeypatch, drier, is_lost
+):
+    program = SimpleNamespace(motion=None, objective=lambda v: drier)
+    monkeypatch.setattr("colloc.search.optimise.ReducedProgram", lambda space, delta: program)
+    gait = SimpleNamespace(space=program, delta=0.1, objective=-1.0, v=None)
+    assert regularisation_dominated(gait) == is_lost
 
 
 def test_in_slow_motion_the_work_is_that_against_friction_and_motors_have_no_limits():

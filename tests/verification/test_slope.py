@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import root
 
 import colloc
-from colloc import Chain, Corners, Foot, Fourier, Friction, Wheel, replay, slope_motion
+from colloc import Chain, Foot, Fourier, Friction, Wheel, replay, slope_motion
 from colloc.gaits.regime import Regime
 from tests.shared.mechanics import coulomb, wrench
 
@@ -139,15 +139,6 @@ def test_the_stated_error_covers_the_true_one(rough):
         off, seen = (np.abs(ran.states[:5, -1] - x).max() for x in (exact, loose.states[:5, -1]))
         assert off < ran.error < 30 * tolerance
         assert ran.error == pytest.approx(seen)
-
-
-def test_rates_may_jump_where_that_is_said():
-    square = Corners([[0.0, 1.0, 1.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
-    told, untold = (
-        slope_motion(Chain(), Friction(), square, 1e-2, 0.2, breaks=b, tolerance=1e-5)
-        for b in (square.corner_phases, ())
-    )
-    np.testing.assert_allclose(told.states[:5, -1], untold.states[:5, -1], atol=1e-4)
 
 
 def test_a_replay_on_a_slope_says_for_which_part_of_the_time_its_motion_is_open():
