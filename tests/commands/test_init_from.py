@@ -330,6 +330,8 @@ def test_a_robot_in_si_units_is_stated_whatever_units_are_typed(tmp_path):
     assert robot == problems[1].robot == problems[2].robot
     assert robot.max_speed == pytest.approx(2 * math.pi)
     assert robot.backlash == pytest.approx(math.radians(1))
+    sought = stated(tmp_path / "sought.py", "--length 1 --mass 1 --period 2 20")
+    assert sought.robot.period == (2, 20)
 
 
 @pytest.mark.parametrize(

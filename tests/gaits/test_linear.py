@@ -121,6 +121,8 @@ def test_a_search_begins_with_a_wave_or_where_a_class_has_none_with_all_of_it_as
 def test_a_symmetry_halves_the_parameters_and_starts_of_many_knots_have_three_harmonics():
     assert [BSpline(8, symmetry=s).size(2) for s in SYMMETRIES] == [16, 8, 8]
     assert [Basis(FOUR, symmetry=s).size(2) for s in SYMMETRIES] == [8, 4, 4]
+    # cos x - cos(3 x) / 6 keeps within so much
+    assert Harmonic(3).bounds(Chain(), 3**0.5 / 2)[1].min() > 1
     # a joint may rest in a column
     assert Basis([np.stack([COS, np.ones(96)])]).size(2) == 1
     smooth = [Harmonic(n).sample_dimension(2) for n in (2, 3, 3)]

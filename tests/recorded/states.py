@@ -64,6 +64,10 @@ STATED = {
         "objective": "distance / (work + 0.1 * period)",
         "guess": Fourier([0.1, 0.2], [[0.0], [0.5]], [[1.0], [0.4]], log_period=0.5 * np.log(100)),
     },
+    "sought": {
+        "robot": replace(ONE, period=(1.0, 20.0)),
+        "guess": Fourier([0.1, 0.2], [[0.0], [0.5]], [[1.0], [0.4]], log_period=3.0),
+    },
     "waves": {
         "body": colloc.ModalBody(2, panels=4),
         "friction": Friction(mu_t=3.0),
@@ -78,6 +82,7 @@ GUESSES = {
     "climb": 0.083,
     "snake": 0.4,
     "pace": 0.0135,
+    "sought": 0.0132,
     "waves": 0.06,
 }
 """Those that are not measured, and how far they go in a cycle, roughly."""
