@@ -144,7 +144,7 @@ def _compare(options: argparse.Namespace, a: Solution, b: Solution) -> int:
     return cli.OK if same else DIFFERENT
 
 
-def _named(source: Path, other: str | Path | None, kind: str) -> Path:
+def _output_name(source: Path, other: str | Path | None, kind: str) -> Path:
     stem = f"{source.stem}-{Path(other).stem}" if other else source.stem
     return source.with_name(stem + kind)
 
@@ -172,7 +172,7 @@ def report(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution = load(source)
     beside = load(options.beside) if options.beside else None
-    path = cli.output_path(options, _named(source, options.beside, ".html"))
+    path = cli.output_path(options, _output_name(source, options.beside, ".html"))
     reference = read_problem_file(options.problem).reference if options.problem else None
     stated = stated_robot(solution, **cli.values(options, *_ROBOT))
     robot = RobotSheet(solution, **stated) if stated else None
@@ -214,7 +214,7 @@ def animate(options: argparse.Namespace) -> int:
     source = Path(options.result)
     solution, other = load(source), options.beside and Path(options.beside)
     beside = load(other) if other else None
-    path = cli.output_path(options, _named(source, other, ".gif"), ("gif", "mp4"))
+    path = cli.output_path(options, _output_name(source, other, ".gif"), ("gif", "mp4"))
     # slow imports only now: a bad option is refused at once
     from colloc.pictures.movie import write_movie
 

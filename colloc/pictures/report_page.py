@@ -80,7 +80,9 @@ def report_page(
         dry = "" if certificate.dry else str(solution.dry())
     with suppress(*_UNKNOWN):
         slopes = solution.sensitivity()
-        floor = [[each.name, f"{each.now:.4g}", *slopes.beside(each)] for each in slopes.seen]
+        floor = [
+            [each.name, f"{each.now:.4g}", *slopes.beside(each)] for each in slopes.of_first_order
+        ]
     planes = [name for name in drawn if name.startswith("shape-")][:_MOST_PLANES]
     courses = {
         "angles": f"{names.quantity}s",

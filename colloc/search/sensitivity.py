@@ -103,7 +103,7 @@ class Sensitivity:
         return vars(self) | {"effects": effects}
 
     @property
-    def seen(self) -> list[Effect]:
+    def of_first_order(self) -> list[Effect]:
         """Effects of first order."""
         least = _NOTHING * abs(self.value)
         return [effect for effect in self.effects if not abs(effect.slope) <= least]

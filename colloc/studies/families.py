@@ -97,7 +97,7 @@ class ParetoFront:
     def narrow(self) -> str:
         """A sentence if nobody can tell its ends apart by their objectives, else ""."""
         little = "The ends differ by less than 1 % in both: there is little to trade."
-        return "" if _told(self.values).any() else little
+        return "" if _distinct_ends(self.values).any() else little
 
     @property
     def certified(self) -> bool:
@@ -298,7 +298,7 @@ def _thin(points: Iterable[_Point], intervals: int) -> list[_Point]:
     return sorted(front, key=lambda each: -each.values[0])
 
 
-def _told(values: np.ndarray) -> np.ndarray:
+def _distinct_ends(values: np.ndarray) -> np.ndarray:
     """Objectives by which the ends of a front can be told apart, ``(2,)``."""
     return np.ptp(values, axis=0) > OPTIONS.close * np.abs(values).max(axis=0)
 
@@ -307,7 +307,7 @@ def _apart(front: list[_Point], intervals: int) -> dict[tuple[_Point, _Point], n
     """Neighbours and their distance in each objective over the even spacing; 0 in an objective in
     which nobody can tell the ends apart."""
     values = np.array([each.values for each in front])
-    spread = np.where(_told(values), np.ptp(values, axis=0), np.inf)
+    spread = np.where(_distinct_ends(values), np.ptp(values, axis=0), np.inf)
     apart = np.abs(np.diff(values, axis=0)) / spread
     return dict(zip(pairwise(front), intervals * apart, strict=True))
 

@@ -109,11 +109,11 @@ class _Integrals:
     ) -> None:
         self._densities = densities
         left, right = edges[:-1], edges[1:]
-        whole, lefts, gained = self._gained(left, right), list[np.ndarray](), list[np.ndarray]()
+        whole, lefts, gained = self._panel_sums(left, right), list[np.ndarray](), list[np.ndarray]()
         while left.size:
             middle = 0.5 * (left + right)
             each = np.column_stack([left, middle]).ravel(), np.column_stack([middle, right]).ravel()
-            parts = self._gained(*each)
+            parts = self._panel_sums(*each)
             both = parts[:, ::2] + parts[:, 1::2]
             changed = np.abs(both - whole).max(axis=0, initial=0.0)
             off = changed > error * np.maximum(right - left, _KINK)
@@ -127,7 +127,7 @@ class _Integrals:
         self._begin = begin[order]
         self._before = np.cumsum(np.pad(np.hstack(gained)[:, order], ((0, 0), (1, 0))), axis=1)
 
-    def _gained(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    def _panel_sums(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
         t = (left[:, None] + (right - left)[:, None] * PANEL_RULE.c).ravel()
         densities = self._densities(t)
         stages = densities.reshape(len(densities), left.size, PANEL_RULE.c.size)
@@ -141,7 +141,7 @@ class _Integrals:
     def __call__(self, ends: np.ndarray) -> np.ndarray:
         """Up to phases, ``(k, n)``."""
         panel = np.searchsorted(self._begin, ends, side="right") - 1
-        return self._before[:, panel] + self._gained(self._begin[panel], ends)
+        return self._before[:, panel] + self._panel_sums(self._begin[panel], ends)
 
 
 def integrate_period(
