@@ -160,6 +160,13 @@ def test_mirror_images_and_end_swap_move_alike(mu, lengths):
         np.testing.assert_allclose(other, ratio, rtol=1e-5)
 
 
+@pytest.mark.parametrize(("mu_b", "harmonics"), [(1.0, (1, 3)), (2.0, (0, 1))])
+def test_directed_friction_tells_headings_apart_by_even_harmonics_too(mu_b, harmonics):
+    tiny = Budget(intervals=2, shapes=4, directions=4, rounds=1, starts=5)
+    bound = efficiency_bound(Chain(), Friction(mu_b=mu_b), 2.0, budget=tiny)
+    assert bound.harmonics == harmonics
+
+
 def test_two_links_with_reversible_friction_cannot_move():
     """A path in one angle retraces itself: finer splines approach a bound of 0."""
     budgets = [Budget(n, (1,), 64, 1, first=n) for n in (8, 16, 32)]

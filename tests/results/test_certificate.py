@@ -193,6 +193,15 @@ def test_mesh_error(failures, three_link, monkeypatch):
     judged("mesh error", run)
 
 
+def test_a_mesh_of_a_path_errs_at_the_delta_of_its_speed(unsolved, monkeypatch):
+    stated = Problem("p", ellipse(0, 2.0, 1.0), gait=colloc.Polygon(4, "bilateral"), delta=1e-2)
+    answer, asked = unsolved(stated).answer, []
+    no_error = SimpleNamespace(estimate=0.0)
+    monkeypatch.setattr(verify, "mesh_error", lambda *at: asked.append(at[3]) or no_error)
+    certify(answer, tolerance=1e-2)
+    assert asked == [answer.delta_per_period] > [5e-2]
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_influence_of_delta(failures, replays, sign):
     largest = replays[max(replays)].efficiency
