@@ -418,14 +418,15 @@ def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int
         run.report("follow", len(candidates) - len(left), len(candidates), best)
 
     def add(candidate: Candidate) -> bool:
-        """Follow a candidate; return whether that led to a new gait."""
+        """Follow a candidate; return whether that led to a new gait, which the body follows."""
         is_new = False
         left.remove(candidate)
         run.ahead.wait_for(follow, problem, candidate.iterate)
         with suppress(CollocError):
             end = follow(problem, candidate.iterate)
             if end.violation <= COARSE:
-                is_new = not any(same_gait(problem, end, other) for other, _ in ends)
+                is_known = any(same_gait(problem, end, other) for other, _ in ends)
+                is_new = not is_known and not end.strays
                 ends.append((end, candidate))
         report()
         return is_new
@@ -455,16 +456,20 @@ def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int
     close_finite = max(close, (1 - OPTIONS.close) * min(finite, default=0.0))
     for k, (optimum, candidate) in enumerate(ends):
         if optimum.objective <= (close_finite if is_visible(optimum.gait) else close):
+            whole, v = space_near(problem, optimum.gait)
+            if whole.mesh.n == optimum.space.mesh.n:
+                continue
             with suppress(CollocError):
-                whole = optimise(*space_near(problem, optimum.gait), optimum.delta, MEDIUM)
-                ends[k] = whole.after(optimum.history), candidate
+                on_whole = optimise(whole, v, optimum.delta, MEDIUM)
+                ends[k] = on_whole.after(optimum.history), candidate
     distinct: list[tuple[Iterate, Candidate]] = []
-    for optimum, candidate in sorted(ends, key=lambda end: end[0].objective):
+    for optimum, candidate in sorted(ends, key=lambda end: (end[0].strays, end[0].objective)):
         twin = next((led for other, led in distinct if same_gait(problem, other, optimum)), None)
         if twin is None:
             distinct.append((optimum, candidate))
         else:
             twin.starts += candidate.starts
+    distinct.sort(key=lambda end: end[0].objective)
     left = [c for c in candidates if not any(c is followed for _, followed in ends)]
     others = [
         Alternative(o.value, o.delta, c.starts, on_speed_floor(problem, o.gait), o.gait)

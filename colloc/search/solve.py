@@ -129,6 +129,7 @@ def _finish_best(problem: Problem, optima: Sequence[Iterate]) -> list[Solution]:
             for each in optima
             if shrank is None or (is_visible(each.gait) is not shrank and each.value > least)
         ]
+        kind.sort(key=attrgetter("strays"))
         for optimum in kind[: OPTIONS.attempts]:
             if optimum.value - OPTIONS.close * abs(optimum.value) < best:
                 break
