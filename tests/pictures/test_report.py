@@ -239,10 +239,14 @@ def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three
     assert "save the problem source above" in text
 
 
-def test_feet_that_hold_are_filled_in_the_film_of_a_card():
+@pytest.fixture(scope="module")
+def found():
     body = Chain(feet=(colloc.Foot(0), colloc.Wheel(1), colloc.Pad(2, 0.2, 0.7)))
     problem = Problem("feet", body=body, gait=Harmonic(1), delta=1e-2)
-    found = evaluate(problem, ellipse(0.0, 1.6, 1.1))
+    return evaluate(problem, ellipse(0.0, 1.6, 1.1))
+
+
+def test_feet_that_hold_are_filled_in_the_film_of_a_card(found):
     held = found.holding(found.sample(np.linspace(0.0, 1.0, 25)))[:, :-1]
     assert 0.1 < held.mean() < 0.9
     hollow = re.findall(r'attributeName="stroke-opacity"[^>]*values="([^"]+)"', found._repr_html_())
@@ -274,11 +278,11 @@ def played(page, of, after, lists=None, hash=""):
     scripts = outline(page).scripts
     (script,) = (text for text in scripts if of in text)
     data = {"motion": '{"t"', "toy-body": '{"lengths"'}
-    texts = {id: next(x for x in scripts if x.startswith(begin)) for id, begin in data.items()}
+    texts = {id: "".join(x for x in scripts if x.startswith(y)) for id, y in data.items()}
     stage = STAGE.replace("LISTS", json.dumps(lists or {})).replace("TEXTS", json.dumps(texts))
     stage = stage.replace("HASH", hash) if lists else ""
-    words = ["node", "-e", f"{stage}{script}\nconsole.log(JSON.stringify([{after}]));"]
-    done = subprocess.run(words, capture_output=True, text=True)
+    program = f"{stage}{script}\nconsole.log(JSON.stringify([{after}]));"
+    done = subprocess.run(["node", "-"], input=program, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -314,6 +318,19 @@ def test_the_page_draws_every_period_as_the_body_friction_and_shape_are_then(tur
         at = [float(x[:-1]) for x in (cursor["style"]["left"], *spot["style"].values())]
         known = 10 + 80 * (t % 1), 10 + 80 * (a + 3) / 6, 80 - 60 * (b + 2) / 4
         np.testing.assert_allclose(at, known, atol=0.01)
+
+
+@needs_node
+def test_feet_that_slide_are_drawn_hollow_in_the_page(found):
+    """Filled, and then once more in the colour of the page."""
+    page, marks, seen = report_page(found), {".cursor": [], ".dot": []}, []
+    for t in np.arange(3, 240, 40) / 240:
+        (made,) = played(page, "function trail", "made", marks, f"#t={t}")
+        begin, end = [k for k, (name, *_) in enumerate(made) if name == "arc"][-2:]
+        slides = ~found.holding(found.sample(t))[:, 0]
+        seen.append(slides.sum())
+        assert sum(name == "moveTo" for name, *_ in made[begin:end]) == 3 + slides.sum()
+    assert np.ptp(seen) > 0
 
 
 @needs_node

@@ -310,8 +310,9 @@ def folder(tmp_path_factory):
     for name, text in READ.items():
         (made / name).write_text(text, encoding="utf-8")
     time = np.arange(41) / 10
-    angles = [*LOOP.angles(time / 4), *(2 * state("loop").sample(time / 4).centre)]
-    np.savetxt(made / "crawls.csv", np.transpose([time, *angles]), "%.6f", ",", header=NAMES)
+    angles = [*np.degrees(LOOP.angles(time / 4)), *(2 * state("loop").sample(time / 4).centre)]
+    digits = "%.2f,%.4f,%.4f,%.6f,%.6f"
+    np.savetxt(made / "crawls.csv", np.transpose([time, *angles]), digits, header=NAMES)
     found = archive(made / "starts.h5")
     failed = replace(outcome(3), status="not converged", message="It did not end.")
     found.add({StartName("latin-hypercube", 0, 3): failed})

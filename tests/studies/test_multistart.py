@@ -163,6 +163,8 @@ def test_an_archive_comes_back_to_the_bit_with_gaits_of_every_class(kind, gait, 
     archive.add({name(4, 7): outcome(4, gait, 1 / 3), name(1, 7): failed})
     back = open_archive(stated, path)
     assert back.outcomes.keys() == archive.outcomes.keys()
+    done = (back.done(SAMPLERS[0], 7, 4 + 1, retry=again) for again in (False, True))
+    assert [*done] == [{1, 4}, {4}]
     for key, one in back.outcomes.items():
         assert type(one.gait) is type(gait)
         assert repr(archives.outcome_fields(one)) == repr(
