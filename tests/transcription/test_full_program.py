@@ -41,7 +41,7 @@ weights: body=Chain(SKEW.lengths, weights=(0.5, 0.2, 0.3))
 polygon by the velocity map: gait=Polygon(4), formulation="implicit velocity"
 coupled: body=Chain((0.25,) * 4), gait=Coupled(Harmonic(1), gears=GEARS), guess=None, torque_limit=0.05
 stuck: body=Chain((0.25,) * 4), gait=Coupled(Harmonic(1), stuck={1: 0.4}), guess=None
-slope: grade=0.1, towards=0.4
+slope: grade=0.1, towards=0.4, torque_limit=0.06
 inertia: froude=0.3, body=SKEW
 inertia on feet, wheels and pads: froude=0.3, body=Chain(SKEW.lengths, feet=PARTS, masses=(0.2, 0.3, 0.5))
 driven uphill: objective="driven efficiency", grade=0.1

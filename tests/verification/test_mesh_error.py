@@ -251,9 +251,13 @@ def test_a_refined_solution_knows_its_scheme_and_its_error():
     assert abs(answer.efficiency / known.efficiency - 1) < 1e-5
 
 
-@pytest.mark.parametrize("wide", [GAIT.scaled(1.2), Fourier([2.0, 2.0], [[0.3]] * 2, [[0.0]] * 2)])
+NONE = np.zeros((2, 1))
+FOLDED = Fourier([2.0, 2.0], [[0.3], [0.3]], NONE), Fourier([-2.0, 0.0], [[1.4], [0.0]], NONE)
+
+
+@pytest.mark.parametrize("wide", [GAIT.scaled(1.2), *FOLDED])
 def test_violations_are_reported_in_the_interval_where_they_are(wide):
-    """Of a joint that bends too far, or links that cross."""
+    """Of a joint that bends too far, to either side, or links that cross."""
     stated, t = problem(), np.linspace(0, 0.5, 2001)
     control = control_problem(stated)
     mesh = control.mesh()
