@@ -96,7 +96,6 @@ def multistart(options: argparse.Namespace) -> int:
         raise ProblemError("--start opens a start of an archive: colloc multistart ARCHIVE.h5.")
     problem = cli.read_problem(options)[1]
     path = cli.output_path(options, Path("results") / f"{problem.name}.starts.h5")
-    # slow imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
     from colloc.results.archive import open_archive, save_archive
     from colloc.search.explore import with_reachable_distance
@@ -171,7 +170,6 @@ def _open_archive(options: argparse.Namespace) -> int:
         )
     name = f"{problem.name}.start-{options.start}.h5"
     path = cli.output_path(options, Path(options.problem).with_name(name))
-    # slow imports only now: a bad option is refused at once
     from colloc.studies.solve import reopen
 
     with cli.status_line(options) as line:
@@ -196,7 +194,6 @@ def sweep(options: argparse.Namespace) -> int:
     if options.chunk is not None:
         study = replace(study, chunk=options.chunk)
     path = cli.output_path(options, Path("results") / f"{study.name}.nc")
-    # slow imports only now: a bad study is refused at once
     from colloc.bounds.optimality_gap import upper_bound
     from colloc.studies.sweep import StudyRun, save_study, study_table
 

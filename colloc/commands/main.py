@@ -1,5 +1,6 @@
 """The entry point ``colloc``: its commands, of which it imports the module of one alone, and what
-they share: options, output paths, printing."""
+they share: options, output paths, printing. Commands import what is slow to import once problem and
+options are known to be good."""
 
 from __future__ import annotations
 

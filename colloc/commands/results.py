@@ -1,8 +1,6 @@
 """Commands about a result: verify (by a new replay with the NumPy solver at other instants; or
 compare two), report, animate, export, robot, sensitivity."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any
@@ -215,7 +213,6 @@ def animate(options: argparse.Namespace) -> int:
     solution, other = load(source), options.beside and Path(options.beside)
     beside = load(other) if other else None
     path = cli.output_path(options, _output_name(source, other, ".gif"), ("gif", "mp4"))
-    # slow imports only now: a bad option is refused at once
     from colloc.pictures.movie import write_movie
 
     settings = cli.values(options, "periods", "seconds", "fps", "width", "from_rest")
@@ -277,7 +274,7 @@ def export(options: argparse.Namespace) -> int:
 def robot(options: argparse.Namespace) -> int:
     source = Path(options.result)
     sheet = load(source).robot(**cli.values(options, *_ROBOT))
-    facts, lines = dict(sheet.facts), sheet.lines()
+    facts, lines = dict(sheet.facts), str(sheet).splitlines()
     if options.figure or options.output:
         path = cli.output_path(options, source.with_suffix(".robot.png"))
         from colloc.pictures.style import save
@@ -296,5 +293,5 @@ def sensitivity(options: argparse.Namespace) -> int:
         if options.again:
             line.say(f"{solution.problem.name}: re-optimising")
         slopes = solution.sensitivity(resolve=options.again)
-    cli.tell(options, {"file": options.result, **slopes.facts()}, slopes.lines())
+    cli.tell(options, {"file": options.result, **slopes.facts()}, str(slopes).splitlines())
     return cli.OK

@@ -315,7 +315,6 @@ def bound_facts(bound: Bound | None) -> dict | None:
 def solve(options: argparse.Namespace) -> int:
     stated, problem = cli.read_problem(options, options.start)
     path = cli.output_path(options, Path("results") / f"{problem.name}.h5")
-    # slow imports only now: a bad problem is refused at once
     from colloc.bounds.optimality_gap import gap_line, upper_bound
     from colloc.studies.solve import resume, save_and_clear
 

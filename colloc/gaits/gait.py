@@ -6,8 +6,6 @@ vanishes under any friction. With the exchange of tail and head ``(S q)_j = -q_(
 - ``antipodal``: q(t + 1/2) = -q(t). The second half period is the mirror image of the first.
 """
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

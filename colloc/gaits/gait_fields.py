@@ -1,7 +1,5 @@
 """Problems, gaits, classes of gaits, bodies and laws as plain dictionaries (JSON), and back."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json

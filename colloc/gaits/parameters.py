@@ -2,8 +2,6 @@
 each differs. Lengths, weights and masses keep adding up to 1, and if the class of gaits asks for a
 body that reads the same from both ends, mirrored links and feet change together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial

@@ -9,8 +9,6 @@ the space of parameters times a fraction of the largest admissible amplitude. St
 seed does not depend on the number of starts.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

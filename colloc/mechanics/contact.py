@@ -11,8 +11,6 @@ hinge is cut away there), close until the free end of the shorter one, of length
 other: the joint turns up to ``pi - asin(w / l)``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -19,8 +19,6 @@ are a *batch*, with the law `friction` and the methods
     slowest(z, delta)                the slowest reference ``(n,)``, and its velocity ``(3, n)``
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

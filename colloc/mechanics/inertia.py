@@ -10,8 +10,6 @@ H_0 of the joints' motion while the tail rests,
 For Fr = 0 this is the balance of forces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ interpreter's lock, so that threads share large batches; results do not depend o
 threads.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import hashlib

@@ -11,8 +11,6 @@ gait may run through one shape in two ways; both differ by no more than the solu
 instant.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise

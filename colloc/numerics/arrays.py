@@ -3,8 +3,6 @@
 Arrays are ``(n_body, n_time)``, and columns never mix; with CasADi there is one column.
 """
 
-from __future__ import annotations
-
 import operator
 from functools import cache
 from types import SimpleNamespace

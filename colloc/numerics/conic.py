@@ -4,8 +4,6 @@ takes as long to load as 200 linear ones.
 DAQP is a dual active-set method (Arnstrom, Bemporad and Axehill, IEEE TAC 67, 2022).
 """
 
-from __future__ import annotations
-
 import threading
 from functools import lru_cache
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 Nothing but arithmetic of known variables is ever evaluated.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """The time grid of a collocation scheme: *points* are the stages, which neighbours share where the
 first is the left end of an interval; *sites* are every edge and every interior stage."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -43,6 +41,11 @@ class Mesh:
         times = np.empty(self.n_point)
         times[self.points] = self.edges[:-1, None] + self.h[:, None] * self.scheme.c
         return times
+
+    def locate(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Intervals of phases, and fractions of them."""
+        k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.n - 1)
+        return k, (t - self.edges[k]) / self.h[k]
 
     @property
     def sites(self) -> np.ndarray:

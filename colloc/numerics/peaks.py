@@ -1,8 +1,6 @@
 """Peaks of functions of time (exchange method; Hettich and Kortanek, SIAM Review 35, 1993), and
 what they add to second derivatives as they move."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -4,8 +4,6 @@
 (Hairer, Norsett and Wanner, Solving ODEs I, section II.7); up to any tau, the interpolant.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from functools import lru_cache

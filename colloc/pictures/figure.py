@@ -35,7 +35,7 @@ from colloc.pictures.style import (
 )
 from colloc.results.motion import foot_kinds, hinges, lab_feet, lab_outline, part_speeds
 from colloc.results.robot import drawn_units, in_si
-from colloc.results.solution import SOLVED, Solution
+from colloc.results.solution import Solution
 from colloc.system.errors import ProblemError
 from colloc.verification.mesh_error import mesh_error
 
@@ -128,7 +128,7 @@ def plot_solution(solution: Solution, ax: Axes | None = None, panel: str = "gait
     if ax is not None:
         named = {name: each.draw for name, each in panels(solution).items()}
         return _plot({"gait": lambda axes: draw_gait(axes, solution), **named}, ax, panel)
-    problem, solved = solution.problem, solution.status == SOLVED
+    problem, solved = solution.problem, solution.success
     more = [text for text in (problem.scene, solution.turning) if text]
     if si := in_si(solution):
         energy = f", {si['energy_J_per_m']:.3g} J/m" if "energy_J_per_m" in si else ""

@@ -28,7 +28,7 @@ from colloc.results.motion import (
     rotate,
 )
 from colloc.results.robot import in_si
-from colloc.results.solution import SOLVED, Solution
+from colloc.results.solution import Solution
 from colloc.system.arguments import check_range, checked_arguments
 from colloc.system.errors import ProblemError
 from colloc.system.files import replaced_file
@@ -148,12 +148,9 @@ def pictures(
     beside: Solution | None = None,
     names: Sequence[str] = (),
 ) -> Iterator[np.ndarray]:
-    """Images ``(height, width, 3)`` of bytes, `count` a cycle, of an even width [pixels].
-
-    A gait `beside` is shown at the same scale and time: body lengths and periods, or metres and
-    seconds where both problems state a robot, `count` pictures in the longer period.
-    """
-    both = [solution, *([] if beside is None else [beside])]
+    """Images ``(height, width, 3)`` of bytes, `count` in the longer period, of an even width
+    [pixels]; else as of `write_movie`."""
+    both = [each for each in (solution, beside) if each is not None]
     alone, facts = beside is None, [in_si(each) for each in both]
     real = all(facts)
     sizes = [each.problem.robot.length if real else 1.0 for each in both]  # type: ignore[union-attr]
@@ -188,7 +185,7 @@ def pictures(
                 scenes[-1].show_friction(axes, strength)
             title = f"{names[k] if names else each.problem.name}   "
             value = f"{each.problem.objective.name} {each.measured.value:.4f}"
-            value += "" if each.status == SOLVED else f"  ({each.status})"
+            value += "" if each.success else f"  ({each.status})"
             if alone:
                 if real:
                     value = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s   (squares of 10 cm)"
@@ -314,9 +311,9 @@ def write_movie(
     ProblemError
         If a number or the ending of the path is unusable, there is no gait, or no ffmpeg for MP4.
     """
+    both = [each for each in (solution, beside) if each is not None]
     if seconds is None:
-        robots = [in_si(each) for each in (solution, beside) if each is not None]
-        real = [facts["period_s"] for facts in robots if facts]
+        real = [facts["period_s"] for facts in map(in_si, both) if facts]
         seconds = float(np.clip(max(real), 1.0, 20.0)) if real else 4.0
     count = round(seconds * fps) if np.isfinite(seconds * fps) else 0
     if periods < 1 or count < 2 or periods * count > _MOST_PICTURES:
@@ -327,7 +324,7 @@ def write_movie(
     writers = {".gif": write_gif, ".mp4": write_mp4}
     if path.suffix not in writers:
         raise ProblemError(f"{path} should end in .gif or .mp4.")
-    for each in (solution, *([] if beside is None else [beside])):
+    for each in both:
         each.gait  # noqa: B018  raises where there is none
     begin, even, total = time.monotonic(), 2 * (width // 2), periods * count
 

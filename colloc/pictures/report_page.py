@@ -38,7 +38,7 @@ from colloc.pictures.style import INK, figure_style
 from colloc.results.comparison import compare, verdict
 from colloc.results.motion import foot_kinds, hinges
 from colloc.results.robot import SLOW_ENOUGH, RobotSheet, in_si
-from colloc.results.solution import SOLVED, Solution
+from colloc.results.solution import Solution
 from colloc.studies.families import ParetoFront
 from colloc.system.arguments import checked_arguments
 from colloc.system.errors import NotConvergedError, ProblemError
@@ -94,7 +94,6 @@ def report_page(
         solution=solution,
         problem=problem,
         certificate=certificate,
-        solved=solution.status == SOLVED,
         si=in_si(solution),
         slow=slow,
         gravity=GRAVITY,
@@ -180,21 +179,12 @@ def _picture(
 
 
 def _toy(body: Body, law: Any) -> dict[str, Any] | None:
-    """Numbers for the sliders of a page; None but for a chain up to eight links that lies flat."""
+    """The body under the sliders of a page; None but for a chain up to eight links that lies
+    flat."""
     fits = type(body) is Chain and not body.feet and body.n_link <= _MOST_PLAYED
     if not fits or type(law) is not Friction:
         return None
-    sliders: list[tuple[Any, ...]] = [
-        ("amplitude", "amplitude", 0, 150, 1, 45, "°"),
-        ("lag", "lag", -180, 180, 1, 90, "°"),
-        ("offset", "offset", -90, 90, 1, 0, "°"),
-    ]
-    low, high = f"{law.smallest / 10:.3g}", f"{5 * law.largest:.3g}"
-    for name, how in zip(law.by_name, ("sideways", "forwards", "backwards"), strict=True):
-        now = f"{getattr(law, name):.4g}"
-        sliders.append((name, f"{name} {how}", low, high, "any", now, ""))
-    flat = {"lengths": body.lengths, "weights": body.weight_column()[:, 0].tolist()}  # type: ignore[attr-defined]
-    return {"body": flat, "sliders": sliders}
+    return {"lengths": body.lengths, "weights": body.weight_column()[:, 0].tolist()}  # type: ignore[attr-defined]
 
 
 def _motion_data(shown: Frames, body: Body) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """Style, colours (Okabe and Ito) and saving of figures, which are made without pyplot."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager

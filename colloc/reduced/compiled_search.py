@@ -3,8 +3,6 @@ where it knows all parts of a program: slow motion on level ground, gaits that a
 parameters, and aims that are arithmetic of distance, work and rotation. Elsewhere
 `colloc.numerics.sqp` does it."""
 
-from __future__ import annotations
-
 import ctypes
 from types import SimpleNamespace
 from typing import Any

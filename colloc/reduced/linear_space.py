@@ -1,7 +1,5 @@
 """Gaits that are linear in their parameters, on a mesh, with their path constraints."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any

@@ -7,8 +7,6 @@ h_k b_i P_ki``. What is left is a program of the gait's parameters alone. Gradie
 sweep.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -192,8 +190,7 @@ class ReducedMotion:
             return self._at_points(limits, self.at(v, delta), t)
         theta = np.zeros(t.size)  # where it is no state
         if "theta" in kind.states:
-            k, tau = self._places(t)
-            theta = self.at(v, delta).pose.at(k, tau)[0]
+            theta = self.at(v, delta).pose.at(*self.mesh.locate(t))[0]
         angles, rates = self._space.at_times(v, t)
         shapes = Shapes(angles, rates, delta)
         return limits.at(kind.instants(shapes, theta))
@@ -252,12 +249,6 @@ class ReducedMotion:
         on_points = np.pad(on_shape, ((0, 0), (0, 1), (0, 0)))
         return totals, on_points, by_states, on_accelerations
 
-    def _places(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Intervals of times of the mesh, and fractions of them."""
-        edges = self.mesh.edges
-        k = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, self.mesh.n - 1)
-        return k, (t - edges[k]) / self.mesh.h[k]
-
     def _torque_arguments(self, s: _State, t: np.ndarray | None = None) -> np.ndarray:
         """(angles, rates, accelerations, momenta, Froude number) that joint torques depend on."""
         kind: Any = self.kind
@@ -266,7 +257,7 @@ class ReducedMotion:
         momenta = s.along.states[: len(STATES)]
         if t is not None:
             angles, rates = self._space.at_times(s.v, t)
-            k, tau = self._places(t)
+            k, tau = mesh.locate(t)
             nodes = [s.along.edges[:, :-1, None], momenta[:, mesh.points]]
             weights = mesh.scheme.lagrange(tau, begin=True)
             momenta = np.einsum("nj,anj->an", weights, np.concatenate(nodes, axis=2)[:, k])

@@ -8,8 +8,6 @@ with h. So a negative curvature counts only where it is still there at a step a 
 long.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

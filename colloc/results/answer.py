@@ -1,7 +1,5 @@
 """The answer of a search: a gait as a point of its full program, with its history and motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -161,8 +159,7 @@ class Answer:
         symmetry = problem.regime.motion_symmetry(problem.gait.symmetry)
         solved, second = solved_phases(symmetry, phase)  # phases of the solved part
         mesh, z_points = self.mesh, self._points[2]
-        k = np.clip(np.searchsorted(mesh.edges, solved, side="right") - 1, 0, mesh.n - 1)
-        tau, theta_0 = (solved - mesh.edges[k]) / mesh.h[k], self.x[self.layout.theta[0, 0]]
+        (k, tau), theta_0 = mesh.locate(solved), self.x[self.layout.theta[0, 0]]
         pose = CollocatedPose.on_mesh(mesh, z_points[2], self.at_points.centre, theta_0)
         theta, place = pose.at(k, tau)
         z = np.einsum("ts,cts->ct", mesh.scheme.lagrange(tau), z_points[:, mesh.points[k]])

@@ -17,8 +17,6 @@ The last one is why a gait of bilateral symmetry closes its rotation whatever mu
 its own image, and the image turns the other way.
 """
 
-from __future__ import annotations
-
 import json
 from itertools import product
 

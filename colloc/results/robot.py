@@ -357,19 +357,16 @@ class RobotSheet:
                 facts["torque_used_slowly"] = used.tolist()
         return facts
 
-    def lines(self) -> list[str]:
+    def __str__(self) -> str:
         law, coordinate = self.solution.problem.law, self.solution.gait.motor_gait.coordinate
         text: str = higher("pictures:render")(
             "robot.txt", robot=self, f=self.facts, coordinate=coordinate, degrees=math.degrees,
             paced=not rate_independent(law), with_inertia=self._with_inertia is not None,
         )  # fmt: skip
-        return text.splitlines()
+        return text.rstrip()
 
     def sentences(self) -> list[str]:
         return str(self).rpartition("\n\n")[2].replace("\n  ", "\n").strip().splitlines()
-
-    def __str__(self) -> str:
-        return "\n".join(self.lines())
 
 
 _EVENLY = np.arange(2000) / 2000

@@ -6,8 +6,6 @@ run that was interrupted calls every stage once more and ends the same to the la
 other processes become known in the same way.
 """
 
-from __future__ import annotations
-
 import functools
 import importlib
 import json

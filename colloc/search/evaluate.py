@@ -21,7 +21,14 @@ import scipy  # loads `optimize` and `special` where they are used
 
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.coupled import Coupled
-from colloc.gaits.fitted_gait import COVERED, Given, Uncertainty, correlation_time, fitted_gait
+from colloc.gaits.fitted_gait import (
+    COVERED,
+    FittedGait,
+    Given,
+    Uncertainty,
+    correlation_time,
+    fitted_gait,
+)
 from colloc.gaits.gait_fields import AnyClass, AnyGait
 from colloc.gaits.harmonic import Fourier, Harmonic
 from colloc.gaits.objective import EFFICIENCY
@@ -48,6 +55,12 @@ from colloc.system.arguments import check_finite
 from colloc.system.environment import higher
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.mesh_error import plan_mesh
+
+
+def _fit_gait(problem: Problem, gait: Any, **how: Any) -> FittedGait:
+    """A gait of the motors; markers may tell the angles of joints, if these are the motors."""
+    body = problem.body if isinstance(problem.body, Chain) and not problem.joint_map else None
+    return fitted_gait(gait, problem.n_motor, body=body, **how)
 
 
 def evaluate(
@@ -101,14 +114,8 @@ def evaluate(
         )
     if schedule(problem.body):
         raise ProblemError(f"{problem.name} is a prescribed motion: it has no other gaits.")
-    fitted = fitted_gait(
-        getattr(gait, "motor_gait", gait),
-        problem.n_motor,
-        period=period,
-        harmonics=harmonics,
-        degrees=degrees,
-        body=problem.body if isinstance(problem.body, Chain) and not problem.joint_map else None,
-    )
+    how: Any = {"period": period, "harmonics": harmonics, "degrees": degrees}
+    fitted = _fit_gait(problem, getattr(gait, "motor_gait", gait), **how)
     series = fitted.gait
     # servo angles about a right angle: all joints bent alike, and links that cross
     if fitted.centre:
@@ -401,9 +408,7 @@ def identify(
     if length is not None:
         check_finite(positive=True, length=length)
     how: Any = {"period": period, "harmonics": harmonics, "degrees": degrees}
-    if isinstance(problem.body, Chain) and not problem.joint_map:
-        how["body"] = problem.body  # whose angles markers may tell
-    fitted = fitted_gait(path := Path(record), problem.n_motor, **how)
+    fitted = _fit_gait(problem, path := Path(record), **how)
     read: Any = fitted.record
     measured, used = _measured(path, read, length)
     fit = _Fit(problem.without_robot, measured, fitted.gait, read.time / fitted.period)

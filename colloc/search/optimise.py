@@ -10,8 +10,6 @@ Every mesh is planned as a whole for the gait at hand (`colloc.verification.mesh
 body's panels with it, and the gait optimised on it, until it needs no other.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 

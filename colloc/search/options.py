@@ -1,7 +1,5 @@
 """Tolerances and heuristics of a search, each with what it trades."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 
 import numpy as np

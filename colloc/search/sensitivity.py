@@ -10,8 +10,6 @@ error: halves of the answer's intervals, and quarters whose knots lie elsewhere,
 knots on the same kinks err alike. With inertia halves and the answer's intervals are enough.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -90,7 +88,8 @@ class Sensitivity:
         return effects[name]
 
     def __str__(self) -> str:
-        return "\n".join(self.lines())
+        render = higher("pictures:render")
+        return render("sensitivity.txt", slopes=self, isfinite=np.isfinite).rstrip()
 
     def facts(self) -> dict[str, Any]:
         """Plain numbers (JSON); None for what there is not."""
@@ -113,11 +112,6 @@ class Sensitivity:
         be."""
         values = {side: f"{self.value + side * CHANGE * effect.slope:.4f}" for side in effect.sides}
         return [values.get(side, "-") for side in (-1, 1)]
-
-    def lines(self) -> list[str]:
-        """Lines of a table for a terminal."""
-        render = higher("pictures:render")
-        return render("sensitivity.txt", slopes=self, isfinite=np.isfinite).splitlines()
 
 
 def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANGE) -> Sensitivity:

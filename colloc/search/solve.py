@@ -1,8 +1,6 @@
 """Stages from a problem to a certified solution: explore, descend, refine, confirm, certify,
 choose; retries, time limits and interrupts are decided here."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress

@@ -92,7 +92,8 @@ def _bind(owner: str, function: Callable[..., Any], values: Any, named: Any) -> 
 
 @functools.cache
 def _types(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
-    """Allowed types by argument; without those that only type checkers can resolve."""
+    """Allowed types by argument, annotated by strings; without those that only type checkers can
+    resolve."""
     types = {}
     for name, each in _signature(function).parameters.items():
         try:

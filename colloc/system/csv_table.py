@@ -1,7 +1,5 @@
 """Tables of numbers in text files, as spreadsheets, loggers and colloc itself write them."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -1,7 +1,5 @@
 """What a process runs in: processors, versions, and imports made on use."""
 
-from __future__ import annotations
-
 import importlib
 import multiprocessing
 import os

@@ -1,7 +1,5 @@
 """Files that are replaced as a whole, names of result files, and locks."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

@@ -4,8 +4,6 @@ CasADi would swallow a KeyboardInterrupt raised in a callback, so compiled solve
 `is_interrupted` between iterations. Nothing slow is imported here.
 """
 
-from __future__ import annotations
-
 import _thread
 import os
 import signal

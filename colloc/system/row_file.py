@@ -6,8 +6,6 @@ Arrays become base64 text; dataclasses and named tuples their fields and the nam
 which only listed ones are made again, without calling ``__init__``, which could change a last bit.
 """
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import dataclasses

@@ -3,8 +3,6 @@
 The next task is requested only when a worker is free, so tasks may depend on earlier results.
 """
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 import os

@@ -1,8 +1,6 @@
 """Decision variables of a full program: their places in the vector x, and feasible values of them
 from a gait, through the balance solver."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

@@ -6,8 +6,6 @@ which it may bind. Links that pass each other's ends give peaks with a kink, so 
 by nested sampling.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any, NamedTuple
 

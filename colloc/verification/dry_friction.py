@@ -20,8 +20,6 @@ Between two instants the worse of them counts, and the error of the replay's qua
 these two are estimates, all else is bounds.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

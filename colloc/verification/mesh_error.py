@@ -8,8 +8,6 @@ where links begin to stick or slip, intervals with the largest errors are *split
 *more nodes* too, of which the mesh with the fewest points wins.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -7,8 +7,6 @@ max_j |dq_j/dt| / v_j``; the least change of an even pace that takes T seconds i
     p(t) = max(level, s(t)),   level such that  int p dt = T.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

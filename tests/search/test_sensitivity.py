@@ -26,7 +26,7 @@ def test_as_much_more_friction_all_round_costs_as_much(three_link, found):
     total = sum(found[f"friction {way}"].slope for way in WAYS)
     assert total == pytest.approx(-three_link.value, rel=2e-5)
     for way in WAYS:  # and so it is written
-        (row,) = (line for line in found.lines() if f"friction {way}" in line)
+        (row,) = (line for line in str(found).splitlines() if f"friction {way}" in line)
         _, *beside, slope, _, _ = row.split()[2:]
         there = [three_link.value + by * found[f"friction {way}"].slope for by in (-0.1, 0.1)]
         assert beside == [f"{value:.4f}" for value in there]
