@@ -5,9 +5,8 @@ Velocities are those of the midpoint of the middle link in its axes, or of the m
 along the mean heading of its links; turning the body end for end negates them. On feet it is the
 centre of pressure, whose speed times min(mu) is at most the power.
 
-A small closed gait at a shape spends times w_i in rate directions r_i, ``sum w_i r_i = 0``, without
-rotation, ``sum w_i omega_i = 0``; per unit of work ``sum w_i P_i = 1`` it moves ``sum w_i e.v_i``
-along e, which is of first order, as motions are not linear in the rates.
+Small closed gaits at a shape (docs/bound.md) move ``sum w_i e.v_i`` along e per unit of work ``sum
+w_i P_i = 1``, which is of first order, as motions are not linear in the rates.
 """
 
 from __future__ import annotations

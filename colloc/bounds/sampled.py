@@ -279,7 +279,7 @@ def largest_gain(amplitudes: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndar
     waves = np.exp(1j * harmonics[:, None] * grid)
     heading = grid[np.argmax(stacked.real @ waves.real - stacked.imag @ waves.imag, axis=1)]
 
-    def terms(theta: np.ndarray) -> np.ndarray:
+    def terms(theta):
         return stacked * np.exp(1j * harmonics * theta[:, None])
 
     best = terms(heading).real.sum(axis=1)

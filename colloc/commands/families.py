@@ -7,7 +7,7 @@ import json
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -23,13 +23,12 @@ from colloc.gaits.problem import Problem
 from colloc.gaits.starts import LATIN_HYPERCUBE, SAMPLERS, on_speed_floor
 from colloc.pictures import render
 from colloc.results.archive import STATUSES, Basin, Outcome, basins, counts
-from colloc.results.solution import SOLVED, Solution
+from colloc.results.solution import SOLVED
 from colloc.system.errors import ProblemError, StoreError
 from colloc.system.files import SUFFIX, lock_file
 
 if TYPE_CHECKING:
     from colloc.gaits.problem_file import ProblemFile
-    from colloc.studies.families import Steering
     from colloc.studies.study import Study
     from colloc.studies.sweep import StudyTable
 
@@ -197,11 +196,11 @@ def sweep(options: argparse.Namespace) -> int:
     from colloc.bounds.optimality_gap import upper_bound
     from colloc.studies.sweep import StudyRun, save_study, study_table
 
-    def known_bound(problem: Problem) -> float | None:
+    def known_bound(problem):
         known = upper_bound(problem, path.parent, compute=False)
         return None if known is None else known.sampled
 
-    def save() -> StudyTable:
+    def save():
         table = study_table(run, known_bound)
         save_study(table, path, source=source, command=options.command)
         return table
@@ -299,10 +298,10 @@ def pareto(options: argparse.Namespace) -> int:
 def steer(options: argparse.Namespace) -> int:
     stated, table, starts = _begin(options, "steer.json")
 
-    def find(say: Callable[..., None]) -> Steering:
+    def find(say):
         from colloc.studies.families import steer as find_gaits
 
-        def report(turn: float, point: Solution) -> None:
+        def report(turn, point):
             say(f"{math.degrees(turn):+.4g} degrees per cycle", point)
 
         say("the straight gait")
@@ -310,9 +309,7 @@ def steer(options: argparse.Namespace) -> int:
         how = {} if starts is None else {"starts": starts}
         return find_gaits(stated.problem, turns, spot=spot, progress=report, **how)
 
-    def describe(
-        family: Steering, members: dict[Path, Solution]
-    ) -> tuple[str, dict[str, Any], list[str]]:
+    def describe(family, members):
         facts = family.table() | {"efficiency": family.efficiency.tolist()}
         how: Any = {"degrees": math.degrees, "isfinite": math.isfinite}
         lines = render("steer.txt", members=members, **how).splitlines()

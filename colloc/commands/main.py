@@ -98,9 +98,8 @@ def _run(words: list[str]) -> int:
 
     hints = [f"solve {name}"] if name.endswith(".py") else []
     hints += difflib.get_close_matches(name, SUBCOMMANDS, n=1)
-    hint = (
-        f"do you mean colloc {hints[0]}?" if hints else f"choose one of {', '.join(SUBCOMMANDS)}."
-    )
+    choose = f"choose one of {', '.join(SUBCOMMANDS)}."
+    hint = f"do you mean colloc {hints[0]}?" if hints else choose
     raise ProblemError(f"there is no command {name!r}; {hint}")
 
 
@@ -169,7 +168,7 @@ def option(
     more = {"metavar": metavar or None} | more
     whole = kind is int
 
-    def read(text: str) -> Any:
+    def read(text):
         try:
             value = kind(text)
         except ValueError:
@@ -435,7 +434,7 @@ def _short_warnings() -> Iterator[None]:
     with warnings.catch_warnings():
         before = warnings.showwarning
 
-        def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        def show(message, category, *where, **more):
             if issubclass(category, own):
                 print(f"colloc: {message}", file=sys.stderr)
             else:

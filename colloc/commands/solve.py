@@ -1,6 +1,5 @@
 """Commands that end in a problem file or in one result, and its summary: init, solve, evaluate,
-identify; and families of gaits as commands save them.
-"""
+identify; and families of gaits as commands save them."""
 
 from __future__ import annotations
 
@@ -69,7 +68,7 @@ _SI: dict[str, tuple[dict[str, float], str, str]] = {
 def _in_units(units: dict[str, float]) -> Callable[[str], float]:
     """Reader of a number that may end in one of these units; without one it is in the first."""
 
-    def read(text: str) -> float:
+    def read(text):
         match = re.fullmatch(r"\s*([-+.\deE]*[\d.])\s*([a-z/]*)\s*", text)
         if not match or match[2] not in {"", *units}:
             raise ValueError(text)
@@ -453,7 +452,7 @@ def find_family(
     with checkpoints_in(table.with_suffix("")):
         with cli.status_line(options) as line:
 
-            def say(what: str, point: Solution | None = None) -> None:
+            def say(what, point=None):
                 value = point and f": {point.problem.objective.short} = {point.value:.6g}"
                 line.say(f"{name}: {what}{value or ''}")
 
@@ -481,8 +480,8 @@ def find_front(options: argparse.Namespace, stated: ProblemFile, table: Path, **
     """Find, save and draw a front, by arguments of `colloc.pareto_front`."""
     from colloc.studies.families import pareto_front
 
-    def find(say: Callable[..., None]) -> ParetoFront:
-        def report(k: int, point: Solution) -> None:
+    def find(say):
+        def report(k, point):
             say(f"gait {k} of the front", point)
 
         say("the ends of the front")

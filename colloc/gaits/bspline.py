@@ -473,7 +473,7 @@ class Basis(LinearClass):
         phases, closed = np.arange(n + 1) / n, np.vstack([values, values[:1]])
         spline = make_interp_spline(phases, closed, _DEGREE, bc_type="periodic")
 
-        def residual(every: int) -> float:
+        def residual(every):
             kept = np.append(np.arange(0, n, every), n)
             coarse = make_interp_spline(phases[kept], closed[kept], _DEGREE, bc_type="periodic")
             return float(np.abs(coarse(phases) - closed).max() / largest)

@@ -233,19 +233,19 @@ class _Samples(NamedTuple):
         self.check(period, harmonics)
         end, step = self.time[-1], self.step
 
-        def up_to(most: int, period: float, chosen: int, drifts: bool = False) -> list[_Fit]:
+        def up_to(most, period, chosen, drifts=False):
             many = min(self.time.size, int(period / step))  # samples of a cycle
             most = harmonics or min(most, max(1, (many - 1) // _SAMPLES_A_HARMONIC))
             return self.scores(_Fit(most, drifts, np.inf, period), harmonics or 1, chosen)
 
-        def fits(period: float, chosen: int) -> list[_Fit]:
+        def fits(period, chosen):
             closed = up_to(_MOST_HARMONICS, period, chosen)
             return closed + up_to(_MOST_HARMONICS, period, chosen, drifts=True)
 
-        def score(period: float) -> float:
+        def score(period):
             return _best(up_to(_ROUGH, period, 0))
 
-        def best_period(low: float, high: float) -> float:
+        def best_period(low, high):
             how: Any = {"method": "bounded", "options": {"xatol": 1e-9 * high}}
             return float(scipy.optimize.minimize_scalar(score, bounds=(low, high), **how).x)
 

@@ -455,7 +455,7 @@ class Serpenoid(Harmonic):
         starts off the phase of members [rad]."""
         lag, gait = getattr(gait, "lag", None), gait.resize(self.harmonics)
 
-        def disagreement(lag: float) -> float:
+        def disagreement(lag):
             wave = _at_the_middle(gait, lag)
             amplitudes = wave.imag if self.symmetry == BILATERAL else np.abs(wave)
             return -float(np.sum(amplitudes**2))

@@ -54,10 +54,8 @@ def parameters(problem: Problem) -> list[Parameter]:
     chain = problem.body if isinstance(problem.body, Chain) else None
     numbers = []
 
-    def add(
-        name: str, value: float, field: str, new: Callable[[float], Any], relative: bool = True
-    ) -> None:
-        def change(by: float) -> Problem:
+    def add(name, value, field, new, relative=True):
+        def change(by):
             part: dict[str, Any] = {field: new(by)}
             if chain and field in _OF_CHAIN:
                 part = {"body": replace(chain, **part)}
@@ -113,12 +111,12 @@ def _add_feet(
 ) -> None:
     weights = [foot.weight or 0.0 for foot in feet]
 
-    def move(group: dict[int, float], by: float) -> tuple[Foot, ...]:
+    def move(group, by):
         return tuple(
             replace(foot, place=foot.place + by * group.get(k, 0.0)) for k, foot in enumerate(feet)
         )
 
-    def reweigh(group: dict[int, float], by: float) -> tuple[Foot, ...]:
+    def reweigh(group, by):
         each = zip(feet, _change_shares(weights, [*group], by), strict=True)
         return tuple(replace(foot, weight=weight) for foot, weight in each)
 

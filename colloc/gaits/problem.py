@@ -238,13 +238,12 @@ class Problem:
         self._check_aims()
         regime.check(self)
         self._check_gaits()
-        bounds = self.joint_limit, self.largest_speeds, self.smallest_shape_speed
         if self.guess is None and self.gait.free:
-            self._set(guess=default_guess(self.body, self.gait, *bounds))
+            self._set(guess=default_guess(self))
         elif self.guess is None:
             self._set(guess=self.gait.member(np.empty(0), n_joint))
         check_kind("guess", self.guess, gait_fields.GAITS)
-        check_guess(self.body, self.gait, self.guess, self.joint_limit, self.smallest_shape_speed)
+        check_guess(self)
 
     def _set(self, **values: object) -> None:
         for name, value in values.items():

@@ -169,7 +169,7 @@ def _parts(root: Element) -> list[_Part]:
     pairs = {x.get("geom2"): x for x in root.findall("contact/pair")}
     parts: list[_Part] = []
 
-    def inherit(default: Element, above: dict[str, dict[str, str]]) -> None:
+    def inherit(default, above):
         own = above | {x.tag: above.get(x.tag, {}) | x.attrib for x in default}
         classes[default.get("class", "main")] = own
         for each in default.findall("default"):
@@ -178,23 +178,23 @@ def _parts(root: Element) -> list[_Part]:
     for default in root.findall("default"):
         inherit(default, {})
 
-    def elements(body: Element, tag: str, usual: str) -> list[Element]:
+    def elements(body, tag, usual):
         each = [(classes.get(x.get("class", usual), {}), x) for x in body.findall(tag)]
         return [Element(tag, names.get(tag, {}) | x.attrib) for names, x in each]
 
-    def friction_of(element: Element, of: str) -> tuple[float, float]:
+    def friction_of(element, of):
         row = _row(element, "friction", "", of) if element.get("friction") else np.ones(1)
         along, across = np.resize(row[:2], 2).tolist()
         return along, across
 
-    def frame_of(element: Element, frame: Any, of: str) -> Any:
+    def frame_of(element, frame, of):
         place, turn = frame
         own = Rotation.from_quat(np.roll(_row(element, "quat", "1 0 0 0", of), -1))
         if element.get("euler"):
             own = Rotation.from_euler(order, unit * _row(element, "euler", "0 0 0", of))
         return place + turn @ _row(element, "pos", "0 0 0", of), turn @ own.as_matrix()
 
-    def grow(body: Element, part: _Part | None, usual: str, above: Any) -> None:
+    def grow(body, part, usual, above):
         usual, of = body.get("childclass", usual), f'"{body.get("name")}"'
         place, turn = frame = frame_of(body, above, of)
         # joints of the first body place it in the world
@@ -284,7 +284,7 @@ def _chain(parts: list[_Part]) -> Model:
                 f"no branches; take all but one away, or fix them."
             )
 
-    def arm(part: _Part) -> list[_Part]:
+    def arm(part):
         return [part, *(y for x in carried[part] for y in arm(x))]
 
     arms = [arm(x) for x in carried[parts[0]]]

@@ -68,7 +68,7 @@ def largest_factor(
     if peak == 0:
         return np.inf
 
-    def crosses(factor: float) -> bool:
+    def crosses(factor):
         return bool(crossing_depth(body, factor * angles + rest).any())
 
     low, high = 0.0, joint_limit / peak
@@ -127,49 +127,42 @@ def checked_member(gait_class: Any, gait: Any) -> tuple[Any, float]:
     return gait, float(length / (2 * np.pi * gait_class.fraction))
 
 
-def default_guess(
-    body: Body,
-    gait_class: Any,
-    joint_limit: Limit,
-    speeds: tuple[float, ...],
-    smallest_shape_speed: float,
-) -> Any:
+def default_guess(problem: Any) -> Any:
     """A wave in a class, no joint of it faster than allowed. `ProblemError` if it hardly moves."""
-    wave = travelling_wave(body, joint_limit, least=smallest_shape_speed)
-    gait = initial_member(gait_class, wave)
+    body, limit, least = problem.body, problem.joint_limit, problem.smallest_shape_speed
+    gait = initial_member(problem.gait, travelling_wave(body, limit, least=least))
     if gait.joint_map is not None:
-        most = largest_factor(body, joint_limit, gait.angles(_PHASES), gait.rest)
+        most = largest_factor(body, limit, gait.angles(_PHASES), gait.rest)
         gait = gait.scaled(min(1.0, most))
-    if (share := largest_share(gait, speeds)) > 1:
+    if (share := largest_share(gait, problem.largest_speeds)) > 1:
         gait = gait.scaled(1 / share)
-    _, rms = checked_member(gait_class, gait)
-    if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
+    _, rms = checked_member(problem.gait, gait)
+    if rms < least * (1 - _AT_THE_BOUND):
         raise ProblemError(
             f"with {'speed_limit' if share > 1 else 'joint_limit'} the usual first gait has a "
             f"root-mean-square shape speed of {rms:.2g}, less than smallest_shape_speed = "
-            f"{smallest_shape_speed:g}: make that smaller, or give a guess."
+            f"{least:g}: make that smaller, or give a guess."
         )
     return gait
 
 
-def check_guess(
-    body: Body, gait_class: Any, guess: Any, joint_limit: Limit, smallest_shape_speed: float
-) -> None:
+def check_guess(problem: Any) -> None:
     """Raise a `ProblemError` for a gait of another body, at rest, or inadmissible."""
+    body, guess, least = problem.body, problem.guess, problem.smallest_shape_speed
     if guess.n_joint != body.n_joint:
         raise ProblemError(
             f"guess has {guess.n_joint} {body.defaults.coordinate}s but the body has "
             f"{body.n_joint}."
         )
-    member, rms = checked_member(gait_class, guess)
-    if rms < smallest_shape_speed * (1 - _AT_THE_BOUND):
+    member, rms = checked_member(problem.gait, guess)
+    if rms < least * (1 - _AT_THE_BOUND):
         raise ProblemError(
             f"guess hardly moves (root-mean-square shape speed {rms:.3g} < smallest_shape_speed "
-            f"{smallest_shape_speed:g}); does it have the symmetry {gait_class.symmetry!r} of its "
+            f"{least:g}); does it have the symmetry {problem.gait.symmetry!r} of its "
             f"class?"
         )
     angles, bounded = member.angles(_CHECKED), body.bounded_angles
-    stretched, limit = under_one_limit(angles, joint_limit)
+    stretched, limit = under_one_limit(angles, problem.joint_limit)
     largest, depth, what = bounded.largest(stretched).max(), crossing_depth(body, angles), ""
     if largest > limit + body.defaults.excess:
         each = np.abs(bounded.rows @ stretched).max(axis=1, initial=0.0)
@@ -266,21 +259,16 @@ def to_body(gait: Any, body: Chain, other: Body, joint_limit: Limit = float(np.p
     return gait.transform(matrix * min(1.0, largest_factor(other, joint_limit, angles)))
 
 
-def to_class(
-    gait_class: Any,
-    gait: Any,
-    body: Body,
-    joint_limit: Limit = float(np.pi),
-    smallest_shape_speed: float = 0.1,
-) -> Any:
+def to_class(problem: Any, gait_class: Any, gait: Any) -> Any:
     """Transfer a gait to a class: a truncated series overshoots, and cuts corners."""
     start = gait_class.through(gait)
-    growth = 2 * np.pi * smallest_shape_speed / start.length
+    growth = 2 * np.pi * problem.smallest_shape_speed / start.length
     if growth > _SHORT:
         start = start.grown(growth)
     if start is gait or not start.is_series:
         return start
-    most = largest_factor(body, joint_limit, start.angles(_PERIOD), start.rest)
+    angles = start.angles(_PERIOD)
+    most = largest_factor(problem.body, problem.joint_limit, angles, start.rest)
     return start.scaled(min(1.0, most))
 
 
@@ -288,8 +276,6 @@ def warm_start(problem: Any, gait: Any, gait_class: Any, **changes: object) -> A
     """The problem in another class, from a known optimum, with delta as to the shape speed."""
     relative = problem.delta / (1.0 if problem.gait.relative_delta else problem.guess.length)
     delta = relative * (1.0 if gait_class.relative_delta else gait.length)
-    guess = to_class(
-        gait_class, gait, problem.body, problem.joint_limit, problem.smallest_shape_speed
-    )
-    stated = {"guess": guess, "gait": gait_class, "delta": delta, "delta_start": _NEAR * delta}
+    stated = {"gait": gait_class, "delta": delta, "delta_start": _NEAR * delta}
+    stated["guess"] = to_class(problem, gait_class, gait)
     return problem.with_(**(stated | changes))

@@ -433,7 +433,7 @@ def _fit_direction(speed: np.ndarray, mu: np.ndarray, v_s: float) -> tuple[float
 def _fit_all(speed: np.ndarray, coefficients: np.ndarray) -> tuple[float, list[np.ndarray]]:
     """The best v_S, and the coefficients of the terms in all directions."""
 
-    def score(log_speed: float) -> float:
+    def score(log_speed):
         return sum(_fit_direction(speed, mu, np.exp(log_speed))[0] for mu in coefficients)
 
     tried = np.log(np.geomspace(speed[speed > 0].min() / _BEYOND, speed.max() * _BEYOND, _SCAN))

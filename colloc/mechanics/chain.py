@@ -256,7 +256,7 @@ class Chain(Body):
         return -np.eye(self.n_joint)[::-1] if self.symmetric else None
 
     def describe(self) -> str:
-        def numbers(values: tuple[float, ...]) -> str:
+        def numbers(values):
             return ", ".join(f"{value:.4g}" for value in values)
 
         wide = f", {self.width:.4g} wide" if self.width else ""

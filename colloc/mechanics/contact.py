@@ -372,7 +372,7 @@ def _within_reach(ends: np.ndarray, pairs: Sequence[Pair], width: float = 0.0) -
     middles = 0.5 * (ends[:, 1:] + ends[:, :-1])
     lengths = _length(ends[:, 1:] - ends[:, :-1]).max(axis=1, initial=0.0)
 
-    def within(middles: np.ndarray, pairs: Sequence[Pair]) -> np.ndarray:
+    def within(middles, pairs):
         i, j = _columns(pairs)
         apart = middles[:, j] - middles[:, i]
         step = _length(np.diff(apart)).max(axis=1, initial=0.0)

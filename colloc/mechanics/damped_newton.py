@@ -1,10 +1,10 @@
 """Damped Newton with a fixed-point safeguard for three rigid velocities, batched over time points.
 
-An associated law is the gradient of a strictly convex, coercive dissipation potential, so
-Armijo-damped Newton on it converges from any start. Other laws have none; there Newton steps are
-taken while they reduce the residual. Where a step fails the paper's fixed point (iteratively
-reweighted least squares on a majorant) goes on. "Natural" steps count if the next one, taken with
-the same matrix, is shorter (Deuflhard, Numer. Math. 22, 1974): the residual may rise.
+Armijo-damped Newton on the potential of an associated law converges from any start
+(docs/theory.md). Under other laws Newton steps are taken while they reduce the residual. Where a
+step fails the paper's fixed point (iteratively reweighted least squares on a majorant) goes on.
+"Natural" steps count if the next one, taken with the same matrix, is shorter (Deuflhard, Numer.
+Math. 22, 1974): the residual may rise.
 
 Velocities are those of a *reference* of the body, which moves to the slowest part, the *anchor*: at
 stick, speeds of order delta keep their relative precision there. Time points that share a reference
@@ -81,7 +81,7 @@ def solve(
     comparison.
     """
 
-    def attempt(todo: np.ndarray, delta: np.ndarray, budget: int, method: str = method) -> None:
+    def attempt(todo, delta, budget, method=method):
         # anchors move to the slowest part as long as that helps
         for _ in range(n_reference):
             moved = []
@@ -130,7 +130,7 @@ def _iterate(
     of steps."""
     friction: Law = batch.friction
 
-    def evaluate(select: np.ndarray, z: np.ndarray, delta: np.ndarray) -> list[np.ndarray]:
+    def evaluate(select, z, delta):
         # the merit that a step has to reduce: the potential, or half the squared residual
         with np.errstate(over="ignore", invalid="ignore"):  # such far steps are not taken
             state, force, potential = batch.evaluate(select, z, delta)

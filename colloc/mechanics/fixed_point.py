@@ -7,7 +7,6 @@ down to delta = 1e-14.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
 from typing import Any
 
@@ -156,17 +155,17 @@ def _search(
     found = _attempt(moving, start, tolerance, max_iterations, "direct")
     enough, contact = _reachable(moving, tolerance), moving.body.contact
 
-    def direct(there: Moving, start: np.ndarray | None) -> np.ndarray:
+    def direct(there, start):
         return _search(there, start, tolerance, max_iterations, "direct")[0]
 
-    def continuation(there: Moving, side: float) -> np.ndarray | None:
+    def continuation(there, side):
         fastest, z = np.maximum(np.abs(there.rates).max(axis=0), there.delta), None
         for away in _AWAY:
             shift = side * away * there.delta / fastest**2 * there.rates
             z = direct(there._replace(angles=there.angles + shift), z)
         return z
 
-    def guesses() -> Iterator[tuple[Callable[[Moving], np.ndarray | None], str]]:
+    def guesses():
         # beside a fold, or with feet nearly on a line, the residual has valleys in which it must
         # rise before it falls
         yield lambda there: found[0][:, failed], "natural"
@@ -262,7 +261,7 @@ def _attempt(
         velocity = _midpoint_velocity(scaled.instant(start / speed, TAIL, scaled_delta), anchor)
     state = State(anchor, velocity)
 
-    def batch(members: np.ndarray, link: int) -> _Batch:
+    def batch(members, link):
         return _Batch(scaled.at(members), link)
 
     solve(state, batch, body.n_link, scaled_delta, tolerance, max_iterations, method)
@@ -340,7 +339,7 @@ def _derivatives(body: Any, friction: Law, anchor: int | None, *, pulled: bool) 
 
     n = body.n_joint
 
-    def equations(y: Any, z: Any, delta: Any) -> tuple[Any, Any]:
+    def equations(y, z, delta):
         angles, rates, load = y[:n], y[n : 2 * n], y[2 * n :]
         if anchor is TAIL:
             slides = body.sliding(friction, angles, rates, z, delta)

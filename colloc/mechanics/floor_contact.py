@@ -74,7 +74,7 @@ class Foot:
     extent: float = field(default=0.0, metadata=STATED_IF_SET)
 
     def __post_init__(self) -> None:
-        def lies(name: str, low: float = -np.inf, high: float = np.inf) -> bool:
+        def lies(name, low=-np.inf, high=np.inf):
             value = getattr(self, name)
             return is_number(value) and low <= value <= high
 
@@ -262,7 +262,7 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
                 f"{weights.size - 1}."
             )
 
-    def weight(foot: Foot) -> float:
+    def weight(foot):
         """Its stated load, or its share of what the other feet leave of the link's weight."""
         if foot.weight is not None:
             return float(foot.weight)

@@ -2,7 +2,7 @@ r"""Regularised Coulomb friction per length, ``-(mu_s vs, mu_t vn)/r`` with ``r 
 delta^2)`` (paper, eqs. frictiondelta and delta), and laws of friction integrated along links.
 
 Along a straight link vs is constant and ``y = vn + w sigma``. *Coulomb friction in closed form*
-(design notes, section 2) is expressed through
+is expressed through
 
     r0, r1   the end values of r,       S = r0 + r1,      a^2 = vs^2 + delta^2
     q        = (w l / S)^2 in [0, 1)
@@ -194,7 +194,7 @@ class LineIntegrals:
         self.law = law
 
     def force(self, vs: Array, vn: Array, w: Array, length: Array, delta: Array) -> LinkForce:
-        def at(sigma: Array, y: Array) -> tuple[Array, ...]:
+        def at(sigma, y):
             fs, fn = self.law.density(vs, y, delta)
             return fs, fn, sigma * fn
 
@@ -253,7 +253,7 @@ def _integrals(
 
 
 def _matrix(density: Any, vs: Array, *at: Array) -> Matrix:
-    def entries(sigma: Array, y: Array) -> tuple[Array, ...]:
+    def entries(sigma, y):
         (ss, sn), (ns, nn) = density(vs, y, at[-1])
         couple = sigma * ns, sigma * nn, sigma * sigma * nn
         return ss, sn, sigma * sn, ns, nn, sigma * nn, *couple

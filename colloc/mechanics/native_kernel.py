@@ -146,7 +146,7 @@ def call_for_all(
     n_time, chain = angles.shape[1], chain_parameters(moving.body, moving.friction)
     given = [np.ascontiguousarray(a) if isinstance(a, np.ndarray) else a for a in arguments]
 
-    def call(first: int) -> int:
+    def call(first):
         last = min(first + piece, n_time)
         return function(*chain, n_time, first, last, angles, rates, moving.delta, *given)
 

@@ -1,10 +1,7 @@
 """All velocities that balance a chain: with unequal coefficients there may be several.
 
-Coulomb friction whose coefficients differ is no gradient and not monotone (docs/theory.md). Where
-several balances exist, a link rests in one of them, or nearly; so solving from every link at rest
-finds them. Far away the net force opposes the velocity, so the signs of the determinant of minus
-its derivative add up to 1 over all solutions (the degree of the map). The slightest inertia leaves
-a motion of negative sign.
+docs/theory.md says why, why solving from every link at rest finds them, and why the signs of the
+determinant of minus the derivative of the net force add up to 1 over all solutions.
 
 A body with a little inertia stays on its branch until that ends in a fold, and then jumps. So a
 gait may run through one shape in two ways; both differ by no more than the solutions do, instant by
@@ -114,7 +111,7 @@ def _solve(
     z, largest = np.concatenate(list(starts), axis=1), _largest_rate(moving.rates)
     unsolved, found = np.flatnonzero(~np.isnan(z[0])), np.zeros(z.shape[1], dtype=bool)
 
-    def repeated(found: np.ndarray) -> np.ndarray:
+    def repeated(found):
         each = np.where(found, z, np.nan).reshape(3, count, n_time).transpose(1, 0, 2)
         return _repeat(each, largest).ravel()
 

@@ -4,10 +4,9 @@ first-order conditions, also at kinks.
 Second derivatives of a reduced gait program jump, so damped BFGS updates (Powell, 1978) build them
 from gradients. SciPy's SLSQP takes 150 to 600 ms a step with 250 variables, where this takes 12.
 
-At a kink some mean of the gradients around a point vanishes: stationarity in the sense of Clarke
-and Goldstein (Math. Program. 13, 1977) by gradient sampling (Burke, Lewis and Overton, SIAM J.
-Optim. 15, 2005); where several kinks meet chance misses sides, and steps down the mean that is
-nearest to 0 find them.
+At a kink some mean of the gradients around a point vanishes (docs/search.md; Goldstein, Math.
+Program. 13, 1977; Burke, Lewis and Overton, SIAM J. Optim. 15, 2005). Where several kinks meet
+samples miss sides, and steps down the mean that is nearest to 0 find them.
 """
 
 from __future__ import annotations
@@ -133,7 +132,7 @@ def stationarity_around(
     columns = _binding(slopes, *_rows_and_bounds(program, v))[2]
     rng = np.random.default_rng(0)
 
-    def lagrangian(u: np.ndarray) -> np.ndarray:
+    def lagrangian(u):
         """Gradient and value ``(n + 1,)``; rows count by what is not linear in them."""
         bent = program.rows(u) - rows - slopes @ (u - v)
         gradient = program.gradient(u) + at.on_rows @ (program.row_slopes(u) - slopes)
@@ -333,7 +332,7 @@ def keep_last(function: Callable[[np.ndarray], Value]) -> Callable[[np.ndarray],
     """Keep the last value of a function for calls at the same point."""
     last: dict[bytes, Value] = {}
 
-    def call(at: np.ndarray) -> Value:
+    def call(at):
         key = at.tobytes()
         if key not in last:
             last.clear()

@@ -42,6 +42,7 @@ from colloc.mechanics.law import Law, rate_independent
 from colloc.pictures import render
 from colloc.results.motion import RigidMotion
 from colloc.results.robot import (
+    UNKNOWN,
     RobotSheet,
     joint_torques,
     pressing,
@@ -56,7 +57,7 @@ from colloc.system.arguments import (
     named_arguments,
     shown,
 )
-from colloc.system.errors import NotConvergedError, ProblemError
+from colloc.system.errors import ProblemError
 from colloc.system.files import write_text
 from colloc.verification.differential_motion import GaitWithInertia
 from colloc.verification.replay import replay
@@ -74,7 +75,6 @@ _FINE, _ACCURACY = 2000, 1e-5  # samples per period, and error, of where the bod
 _SETTLED = 10  # periods after which all are alike
 _UNITS = {"rad": "angles", "rad_per_s": "speeds", "N_m": "torques", "W": "powers"}
 _UNITS |= {"deg": "angles", "deg_per_s": "speeds"}
-_UNKNOWN = ProblemError, NotConvergedError
 _THIN = 0.02  # width and height of links that have none [body lengths]
 _POINTS = 16  # on which a pad or a link stands
 _STEPS, _LONGEST = 8000, 1e-3  # time steps of a cycle, and the longest one [s]
@@ -202,7 +202,7 @@ def write_export(
         facts["pace"] = f"the gait's own, as {paced_by}; distance and work hold {holds}"
         facts |= {"froude_number": froude} if froude else {}
 
-    def into_gait(rate: float, trajectory: Trajectory = trajectory) -> Approach:
+    def into_gait(rate, trajectory=trajectory):
         speeds, most = np.abs(trajectory.speeds), limits
         if limits is None:
             stated = np.array(problem.largest_speeds) / trajectory.period
@@ -236,7 +236,7 @@ def write_export(
         rows[-1].append(torques)
         if ramp:
             joints = problem.joint_path(parts[0].angles, trajectory.period * parts[0].speeds)
-            theta = getattr(solution.gait, "theta", None) or 0.0  # the initial heading on a slope
+            theta = solution.gait.theta or 0.0  # the initial heading on a slope
             pull = problem.regime.pull(np.full((1, parts[0].time.size), theta))
             rows[0].append(robot.torque_unit * quasi_static_torques(solution, *joints, pull))
         for row in rows:
@@ -306,7 +306,7 @@ def _end(
         period * np.append(way.speeds, trajectory.speeds[:, :1], axis=1),
     )
     inertial = False
-    with suppress(*_UNKNOWN):
+    with suppress(*UNKNOWN):
         if froude:
             long = -float(time[0])
             spline = CubicHermiteSpline(1.0 + time / long, angles, long * rates, axis=1)
@@ -367,7 +367,7 @@ def _write_model(robot: RobotSheet, path: Path) -> dict[str, Any]:
             replace(foot, friction=foot.friction and _in_mujoco(foot.friction))
             for foot in chain.standing_on
         )
-        with suppress(*_UNKNOWN):
+        with suppress(*UNKNOWN):
             facts["moves_body_lengths_per_period"] = replay(
                 replace(chain, feet=feet) if chain.feet else chain, _in_mujoco(law), solution.gait,
                 solution.delta_per_period, tolerance=1e-3, turn=solution.rotation,
@@ -437,7 +437,7 @@ def mjcf(robot: RobotSheet, *, contacts: bool = True) -> str:
                     "rolling": law.rolling if turns else 0.0,
                 }
             )
-    pull = problem.regime.pull(np.array([[getattr(gait, "theta", None) or 0.0]]))
+    pull = problem.regime.pull(np.array([[gait.theta or 0.0]]))
     leaning = (0.0, 0.0) if pull is None else pull[:, 0]  # gravity leans, not the floor
     start = gait.angles(np.zeros(1))[:, 0]
     posture = [0.0, 0.0, 0.0]  # the tail, joints, and feet on slides and hinges, link by link
@@ -479,7 +479,7 @@ def _in_mujoco(law: Law) -> Law:
         max(float(np.hypot(*(force[0, 0] for force in law.density(*way, 1e-12 * one)))), _LEAST)
         for way in ((one, none), (-one, none), (none, one))
     )
-    along = float(np.sqrt(ahead * back))
+    along = math.sqrt(ahead * back)
     return Elliptic(mu_t=aside, mu_f=along, mu_b=along)
 
 

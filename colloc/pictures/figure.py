@@ -99,7 +99,7 @@ def _plot(
 
 def panels(solution: Solution) -> dict[str, Panel]:
 
-    def panel(width: float, height: float, draw: Callable[..., object], *more: int) -> Panel:
+    def panel(width, height, draw, *more):
         return Panel(width, height, lambda axes: draw(axes, solution, *more))
 
     problem = solution.problem
@@ -182,7 +182,7 @@ class BodyMarks:
     ) -> None:
         link, joint, head, spot, foot = sizes
 
-        def line(marker: str = "", **look: Any) -> Any:
+        def line(marker="", **look):
             return axes.plot([], [], marker=marker, ls="" if marker else "-", **look)[0]
 
         self._axes, self._hinges, self._width = axes, hinges(body), link_width(body)
@@ -518,7 +518,7 @@ def _draw_tracks(axes: Axes, family: Steering) -> None:
 
 
 def robot_panels(robot: RobotSheet) -> dict[str, Panel]:
-    def panel(what: str, unit: str) -> Panel:
+    def panel(what, unit):
         t, rows = robot.columns["t"].values, robot.columns[f"joint_{what}s"].values
         labels = "time  [s],  one cycle", f"{what}  [{unit}]"
         return Panel(COLUMN, 2.2, lambda axes: _draw_series(axes, t, rows, "joint", *labels))

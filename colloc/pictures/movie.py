@@ -186,20 +186,17 @@ def pictures(
             title = f"{names[k] if names else each.problem.name}   "
             value = f"{each.problem.objective.name} {each.measured.value:.4f}"
             value += "" if each.success else f"  ({each.status})"
+            speed = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s" if real else ""
             if alone:
-                if real:
-                    value = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s   (squares of 10 cm)"
+                value = f"{speed}   (squares of 10 cm)" if real else value
                 figure.text(left, 0.93, title + value, fontsize=11 * small, weight="bold")
                 continue
             way = f"{each.distance:.4f} body lengths per cycle"
             if real:
-                way = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s, {times[k]:.3g} s per cycle"
-            figure.text(
-                left, 0.085 * width / height, title, fontsize=11 * small, weight="bold", va="top"
-            )
-            figure.text(
-                left, 0.055 * width / height, f"{way}; {value}", fontsize=9 * small, va="top"
-            )
+                way = f"{speed}, {times[k]:.3g} s per cycle"
+            upper, lower = 0.085 * width / height, 0.055 * width / height
+            figure.text(left, upper, title, fontsize=11 * small, weight="bold", va="top")
+            figure.text(left, lower, f"{way}; {value}", fontsize=9 * small, va="top")
         right, unit = (share if alone else 0.99), " s" if real else ""
         top = 0.93 if alone else 1 - 0.028 * width / height
         clock = figure.text(right, top, "", fontsize=10 * small, color=GREY, ha="right")
@@ -328,7 +325,7 @@ def write_movie(
         each.gait  # noqa: B018  raises where there is none
     begin, even, total = time.monotonic(), 2 * (width // 2), periods * count
 
-    def with_progress(line: StatusLine) -> Iterator[np.ndarray]:
+    def with_progress(line):
         how: Any = {"arrows": arrows, "width": even, "from_rest": from_rest}
         drawn = pictures(solution, count, periods, **how, beside=beside, names=names)
         for k, picture in enumerate(drawn, 1):

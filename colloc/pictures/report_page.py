@@ -37,15 +37,13 @@ from colloc.pictures.movie import Frames, frames
 from colloc.pictures.style import INK, figure_style
 from colloc.results.comparison import compare, verdict
 from colloc.results.motion import foot_kinds, hinges
-from colloc.results.robot import SLOW_ENOUGH, RobotSheet, in_si
+from colloc.results.robot import SLOW_ENOUGH, UNKNOWN, RobotSheet, in_si
 from colloc.results.solution import Solution
 from colloc.studies.families import ParetoFront
 from colloc.system.arguments import checked_arguments
-from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import write_text
 
 _MOST_PLANES, _MOST_PLAYED = 6, 8
-_UNKNOWN = ProblemError, NotConvergedError
 _FILM, _FILM_FRAMES, _FILM_PERIODS = (320, 200), 24, 2  # largest size [pixels] of that of a card
 _FOOT_WORDS = {
     FOOT: "Squares: feet.",
@@ -74,11 +72,11 @@ def report_page(
     names, replayed = problem.body.defaults, certificate.replayed
     drawn, slow, dry, floor = panels(solution), 0.0, "", list[list[str]]()
     if not problem.froude:
-        with suppress(*_UNKNOWN):
+        with suppress(*UNKNOWN):
             slow = solution.slow_enough(SLOW_ENOUGH)
-    with suppress(*_UNKNOWN):
+    with suppress(*UNKNOWN):
         dry = "" if certificate.dry else str(solution.dry())
-    with suppress(*_UNKNOWN):
+    with suppress(*UNKNOWN):
         slopes = solution.sensitivity()
         floor = [
             [each.name, f"{each.now:.4g}", *slopes.beside(each)] for each in slopes.of_first_order
@@ -278,7 +276,7 @@ def _card(solution: Solution, shown: Frames, scale: float, *, film_alone: bool =
     body, (low, high) = solution.problem.body, shown.window
     points = np.linspace(0, len(shown.ends[0]) - 1, min(30, len(shown.ends[0]))).round().astype(int)
 
-    def texts(places: np.ndarray) -> list[str]:
+    def texts(places):
         """Points ``(2, n_point, n_time)`` of every frame of all periods; y points down."""
         once = places[..., :-1]
         moved = [before.of(once.reshape(2, -1)).reshape(once.shape) for before in shown.before]

@@ -1,6 +1,5 @@
 """Gaits that are linear in their parameters, on a mesh, with their path constraints."""
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -145,21 +144,21 @@ class LinearSpace(SearchSpace):
         functions = checks.functions(gaits, which, times)
 
         @keep_last
-        def at_worst(v: np.ndarray) -> np.ndarray:
+        def at_worst(v):
             found = functions.copy()
             worst = placed.follow(moving, gaits, self._table(v), mesh, self._limit)
             found[:, moving] = checks.functions(gaits, which[moving], worst)
             return found
 
-        def rows(functions_at: Callable[[np.ndarray], np.ndarray]) -> Constraints:
-            def shapes(v: np.ndarray) -> np.ndarray:
+        def rows(functions_at):
+            def shapes(v):
                 return self._table(v) @ functions_at(v) + rest
 
-            def values(v: np.ndarray) -> np.ndarray:
+            def values(v):
                 found = checks.values(which, shapes(v), placed.shares)
                 return np.append(found, self._square_of_speed(v)[0])
 
-            def slopes(v: np.ndarray) -> np.ndarray:
+            def slopes(v):
                 on_shapes = checks.slopes(which, shapes(v), placed.shares)
                 found = gaits.pull_back(on_shapes, functions_at(v))
                 return self.shape_vjp(v, np.vstack([found, self._square_of_speed(v)[1]]))
@@ -167,7 +166,7 @@ class LinearSpace(SearchSpace):
             most = float(excess.max(initial=-np.inf))
             return Constraints(kinds, lower, np.append(upper, np.inf), most, values, slopes)
 
-        def kernel_rows(moving: np.ndarray) -> dict[str, Any] | None:
+        def kernel_rows(moving):
             if not gaits.linear or self._n_static or (moving.size and type(gaits) is not Harmonic):
                 return None
             low, high = (each[which[moving]] for each in checks.bounds(self._limit))

@@ -357,7 +357,7 @@ def _density_slopes(
 
     n = body.n_joint
 
-    def equations(y: Any, z: Any, delta: Any) -> tuple[Any, Any]:
+    def equations(y, z, delta):
         angles, rates, load = y[:n], y[n : 2 * n], y[2 * n :] if pulled else None
         more: Any = {"z": z, "load": load, "joint_map": joint_map}
         out = of.at(Instants(body, friction, angles, rates, delta, **more))

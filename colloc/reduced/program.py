@@ -189,7 +189,7 @@ class ActuatorRows:
         each, left, width = np.arange(held.size), mesh.edges[interval], mesh.h[interval]
         edge = _INSIDE[0] * width
 
-        def shares(at: np.ndarray, t: np.ndarray) -> np.ndarray:
+        def shares(at, t):
             """Of every row ``(n_row, k)``, for parameters and phases of that shape."""
             every = self._motion.shares(self._limits, at, delta, t.ravel())
             return every.reshape(-1, *t.shape)[share, each]

@@ -51,7 +51,7 @@ def curvature(program: ReducedProgram, v: np.ndarray) -> Curvature:
     rows, slopes, on_rows = program.rows(v), program.row_slopes(v), conditions.on_rows
     bound = [(name, k) for k, name in enumerate(program.row_names) if on_rows[k]]
 
-    def value(at: np.ndarray) -> float:
+    def value(at):
         program.move_checks(at)
         found, now = program.objective(at), program.rows(at)
         place = {name: k for k, name in enumerate(program.row_names)}
@@ -80,11 +80,11 @@ def curvature(program: ReducedProgram, v: np.ndarray) -> Curvature:
     moving = program.of_moving_peaks(v, on_rows)
     moving += curvature_of_moving(on_rows, *map(np.array, zip(*around, strict=True)))
 
-    def slope(at: np.ndarray) -> np.ndarray:
+    def slope(at):
         """Gradient of the Lagrangian with the rows at the worst instants of v."""
         return program.gradient(at) + on_rows @ program.row_slopes(at)
 
-    def product(z: np.ndarray, step: float) -> np.ndarray:
+    def product(z, step):
         return (slope(v + step * z) - slope(v - step * z)) / (2 * step) + moving @ z
 
     step = _STEP * (float(np.linalg.norm(v)) or 1.0)

@@ -185,7 +185,7 @@ def row_path(path: str | os.PathLike[str]) -> Path:
 
 
 def _read(path: Path, problem: Problem | None = None) -> Archive | None:
-    def decode(row: Any) -> Problem | tuple[StartName, Outcome]:
+    def decode(row):
         if isinstance(row, dict):
             return Problem.from_dict(row)
         (sampler, seed, number), outcome = row

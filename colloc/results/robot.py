@@ -47,7 +47,7 @@ SLOW_ENOUGH = 0.01  # share of the efficiency that inertia may take from a quasi
 _SAME_PACE = 0.01  # relative difference of Froude numbers that counts as none
 _ACCURACY = 1e-6  # of the momenta with inertia
 _INSTANTS, _A_SIDE = 2000, 8  # samples of a cycle, and of a side of a polygon, at least
-_UNKNOWN = ProblemError, NotConvergedError
+UNKNOWN = ProblemError, NotConvergedError
 
 
 def joint_torques(
@@ -256,7 +256,7 @@ class RobotSheet:
 
     @cached_property
     def _with_inertia(self) -> _MotionWithInertia | None:
-        with suppress(*_UNKNOWN):
+        with suppress(*UNKNOWN):
             if not self.solution.problem.froude:
                 return _MotionWithInertia(self.solution, self.froude)
         return None
@@ -334,7 +334,7 @@ class RobotSheet:
             if moving is not None:
                 facts["inertia_takes"] = 1.0 - moving.distance / moving.work / solution.efficiency
                 facts["rotation_by_inertia_rad"] = moving.rotation - solution.rotation
-            with suppress(*_UNKNOWN):
+            with suppress(*UNKNOWN):
                 if rate_independent(problem.law):
                     slow = self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH))
                     facts["slow_enough_period_s"] = math.sqrt(slow)
@@ -342,7 +342,7 @@ class RobotSheet:
             gait, limits = solution.gait.motor_gait, np.asarray(self.max_speed)
             shortest = shortest_period(gait, limits, keep_pace=True)
             facts |= {"max_speed_rad_per_s": limits.tolist(), "shortest_period_s": shortest}
-            with suppress(*_UNKNOWN):
+            with suppress(*UNKNOWN):
                 paced = _MotionWithInertia(solution, self.froude * (self.period / shortest) ** 2)
                 speed = paced.distance * self.length / shortest
                 facts["speed_at_shortest_period_m_per_s"] = speed
@@ -374,26 +374,21 @@ _BINDS, _MARGIN = 0.99, 1.01  # share of a limit at which it binds; of a bound a
 _FIELDS = {"joint speed": "speed_limit", "torque": "torque_limit", "power": "power_limit"}
 
 
-class _Unit(NamedTuple):
-    name: str  # of the limit as it was stated
-    text: str
-    size: float = 1.0  # of the problem's unit
-
-
-def _units(problem: Problem) -> dict[str, _Unit]:
+def _units(problem: Problem) -> dict[str, tuple[str, str, float]]:
+    """Names of limits as they were stated, their units, and those in the problem's."""
     units = {
-        "speed_limit": _Unit("speed_limit", "rad per period"),
-        "torque_limit": _Unit("torque_limit", "weight x body length"),
-        "power_limit": _Unit("power_limit", "weight x body length per period"),
+        "speed_limit": ("speed_limit", "rad per period", 1.0),
+        "torque_limit": ("torque_limit", "weight x body length", 1.0),
+        "power_limit": ("power_limit", "weight x body length per period", 1.0),
     }
-    if (robot := problem.robot) is not None:
-        for field, stated, text in (
-            ("speed_limit", "max_speed", "rad/s"),
-            ("torque_limit", "max_torque", "N m"),
-        ):
-            if limit := getattr(problem, field):  # not of a speed where the period is sought
-                size = np.ravel(getattr(robot, stated))[0] / np.ravel(limit)[0]
-                units[field] = _Unit(stated, text, float(size))
+    for name, stated, unit in (
+        ("speed_limit", "max_speed", "rad/s"),
+        ("torque_limit", "max_torque", "N m"),
+    ):
+        limit = getattr(problem, name)
+        if problem.robot is not None and limit:  # not of a speed where the period is sought
+            size = np.ravel(getattr(problem.robot, stated))[0] / np.ravel(limit)[0]
+            units[name] = stated, unit, float(size)
     return units
 
 
@@ -425,22 +420,22 @@ def limit_shares(solution: Solution) -> dict[str, float]:
 
 def limit_lines(solution: Solution) -> list[str]:
     """Utilisations in a line, and a line for each limit that seems to be in other units."""
-    used, texts, units = limit_shares(solution), [], _units(solution.problem)
+    problem, used, texts = solution.problem, limit_shares(solution), []
+    units = _units(problem)
     for name, share in used.items():
         text = f"{name} {100 * share:.{0 if share >= 0.01 else 2}f} %"
         field = _FIELDS.get(name, "")
-        limit, unit = getattr(solution.problem, field, None), units.get(field)
-        robot = solution.problem.robot
-        if robot is not None and name == SPEED_OF_ROBOT:
-            limit, unit = robot.max_speed, _Unit("max_speed", "rad/s")
-        if unit and limit and not isinstance(limit, tuple):
-            text += f" of {limit * unit.size:g} {unit.text}"
+        limit, (_, unit, size) = getattr(problem, field, None), units.get(field, ("", "", 1.0))
+        if problem.robot is not None and name == SPEED_OF_ROBOT:
+            limit, unit = problem.robot.max_speed, "rad/s"
+        if limit and not isinstance(limit, tuple):
+            text += f" of {limit * size:g} {unit}"
         texts.append(text)
     if not used:
         return []
-    if solution.problem.joint_map is not None:  # motors share what their joints need
+    if problem.joint_map is not None:  # motors share what their joints need
         return [", ".join(texts)]
-    return [", ".join(texts), *_hints(solution.problem, used.get("joint speed", 0.0))]
+    return [", ".join(texts), *_hints(problem, used.get("joint speed", 0.0))]
 
 
 def _hints(problem: Problem, speed_used: float) -> Iterator[str]:
@@ -456,7 +451,9 @@ def _hints(problem: Problem, speed_used: float) -> Iterator[str]:
         speed = 2 * math.pi * gait.harmonics * half
     power = torque * np.minimum(speed, problem.largest_speeds or np.inf)
     units = _units(problem)
-    for (name, unit), bound in zip(units.items(), (speed, torque, power), strict=True):
+    for (name, (called, unit, size)), bound in zip(
+        units.items(), (speed, torque, power), strict=True
+    ):
         limit = getattr(problem, name)
         if not isinstance(limit, tuple):  # of all joints: it matters if it does to one of them
             bound = bound.max(keepdims=True)
@@ -465,16 +462,16 @@ def _hints(problem: Problem, speed_used: float) -> Iterator[str]:
             joint = int(np.argmax(stated / bound))
             of = f" of joint {joint + 1}" * isinstance(limit, tuple)
             yield (
-                f"{unit.name} {unit.size * stated[joint]:g}{of} cannot matter: no gait needs more "
-                f"than {unit.size * bound[joint]:.3g} {unit.text}, its unit"
+                f"{called} {size * stated[joint]:g}{of} cannot matter: no gait needs more than "
+                f"{size * bound[joint]:.3g} {unit}, its unit"
             )
     if speed_used > _BINDS:
         most = np.array(problem.largest_speeds) / 2
         joint = int(np.argmin(most / half))
         if most[joint] < 2 * half[joint]:
             swing, largest = np.degrees([most[joint], 2 * half[joint]])
-            unit = units["speed_limit"]
+            called, unit, size = units["speed_limit"]
             yield (
-                f"{unit.name} {2 * unit.size * most[joint]:g} {unit.text}, its unit, lets a joint "
+                f"{called} {2 * size * most[joint]:g} {unit}, its unit, lets a joint "
                 f"swing by {swing:.3g} of {largest:.3g} degrees at most"
             )

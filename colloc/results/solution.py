@@ -256,8 +256,7 @@ class Solution:
         return self.answer.gait.with_coordinate(self.problem.body.defaults.coordinate)
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
-        """The motion at phases t, any real numbers, period after period:
-        `Answer.sample`."""
+        """The motion at phases t, any real numbers, period after period: `Answer.sample`."""
         return self.answer.sample(t)
 
     @property
@@ -283,8 +282,8 @@ class Solution:
                 f"{p.name} has no inertia, and is under way at once: from rest is for problems "
                 f"with a froude."
             )
-        how: Any = {"grade": p.grade, "theta": getattr(self.gait, "theta", None) or 0.0}
-        how["periods"] = max(1, int(np.ceil(t[-1])))
+        how: Any = {"grade": p.grade, "theta": self.gait.theta or 0.0}
+        how["periods"] = max(1, math.ceil(t[-1]))
         ran = self.played_by(motion_from_rest, self.froude, **how)
         states = np.array([np.interp(t, ran.phases, row) for row in ran.states])
         return motion_with_inertia(checked_mass(p.body), self.gait, t, states)
@@ -294,14 +293,11 @@ class Solution:
         body = self.problem.body
         if not foot_kinds(body):
             return np.zeros((0, motion.t.size), dtype=bool)
-        speeds = part_speeds(body, motion)[1]
-        return speeds < 3.0 * self.delta_per_period
+        return part_speeds(body, motion)[1] < 3.0 * self.delta_per_period
 
     @property
     def share_held(self) -> np.ndarray:
         """Fraction of the cycle for which each foot sticks, ``(n_foot,)``, from the tail."""
-        if not foot_kinds(self.problem.body):
-            return np.empty(0)
         return self.holding(self.sample(_INSTANTS)).mean(axis=1)
 
     @property

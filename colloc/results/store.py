@@ -128,7 +128,7 @@ def load(path: str | os.PathLike[str]) -> Solution:
 def holds_more(path: str | os.PathLike[str], solution: Solution) -> bool:
     """True if the file of a solution holds more than `save` writes, such as remarks."""
 
-    def names(file: h5py.File) -> set[str]:
+    def names(file):
         found = {f"/@{name}" for name in file.attrs}
         file.visititems(
             lambda at, item: found.update([at, *(f"{at}@{name}" for name in item.attrs)])

@@ -25,7 +25,6 @@ import numpy as np
 from colloc.gaits import gait_fields
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import is_visible
-from colloc.reduced.program import SearchSpace
 from colloc.results.answer import Answer, SecondOrder, Step
 from colloc.results.checks import Certificate, Check
 from colloc.results.solution import Solution
@@ -156,7 +155,7 @@ class Run:
         if (self._stage, stage) == ("follow", "descend"):
             return  # each gait is followed by a descent of its own
 
-        def may_be_the_answer(iterate: Iterate) -> bool:
+        def may_be_the_answer(iterate):
             return iterate.problem.shrinking or is_visible(iterate.gait)
 
         if best is not None and self.problem and best.problem.froude != self.problem.froude:
@@ -195,21 +194,21 @@ def _codec() -> Codec:
     it, each made once."""
     known: dict[str, Any] = {}
 
-    def once(plain: Any, make: Callable[[Any], Any]) -> Any:
+    def once(plain, make):
         key = json.dumps(plain, sort_keys=True)
         if key not in known:
             known[key] = make(plain)
         return known[key]
 
-    def problem_fields(problem: Problem) -> Any:
+    def problem_fields(problem):
         plain = problem.to_dict()
         once(plain, lambda _: problem)  # from other processes it comes back
         return plain
 
-    def arguments(space: SearchSpace) -> Any:
+    def arguments(space):
         return codec.encode((space.control.problem, space.edges, space.scheme, space.far))
 
-    def space(plain: Any) -> Any:
+    def space(plain):
         return once(plain, lambda plain: space_of(*codec.decode(plain)))
 
     records = [Answer, Certificate, Check, Iterate, SecondOrder, Step]

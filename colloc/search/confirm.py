@@ -310,12 +310,10 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
         failed = f"{what} is off by {excess:.1e} {window}"
         if group == ACTUATORS:
             limits = program.control.problem.path_limits
-            each = [
-                (limit.function, most) for limit in limits.each for most in np.ravel(limit.most)
-            ]
-            function, most = each[(worst - rows.start) % len(limits.names)]
+            each = ((limit, most) for limit in limits.each for most in np.ravel(limit.most))
+            limit, most = [*each][(worst - rows.start) % len(limits.names)]
             units = {"moment": " weight x body length", "power": " weight x body length per period"}
-            failed = f"{what} is {most:g}{units.get(function, '')}, and the gait needs "
+            failed = f"{what} is {most:g}{units.get(limit.function, '')}, and the gait needs "
             failed += f"{1 + excess:.4g} times as much {window}"
         advice = next(text for names, text in _ADVICE.items() if group.startswith(names))
     elif result.status == "still moving":
@@ -331,9 +329,7 @@ def explanation(program: FullProgram, result: NlpResult, delta: float) -> str:
             "use more intervals, since kinks at stick may be under-resolved, or start from "
             "another guess"
         )
-        # links at stick move at the order of delta, tail velocities resolve 1e-16, so the gradient
-        # is known to 1e-16/delta: KKT errors of 1.8e-8 at 1e-8, 1.3e-7 at 1e-9, 2e-6 at 1e-10 were
-        # measured on one harmonic of three links
+        # the gradient is known to 1e-16/delta (docs/developers/error_control.md)
         if delta < 1e-9:
             advice = "ask for a delta of at least 1e-09, below which rounding hides the optimum"
     effort = f"not converged at delta = {delta:.1e} after {result.iterations} iterations"
@@ -421,11 +417,8 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
         # with friction as steep as 1 / delta, multipliers of the balance are known to fewer digits
         # than the conditions need
         where = f"KKT error {here.kkt_error:.1e}; {before.kkt_error:.1e} on the {kind} program"
-        return (
-            program,
-            here,
-            f"First-order conditions hold in the reduced space ({where}); {ended}.",
-        )
+        text = f"First-order conditions hold in the reduced space ({where}); {ended}."
+        return program, here, text
     return program, failed, f"{explanation(program, failed, delta)} {ended}."
 
 
@@ -533,7 +526,7 @@ def solve_directly(problem: Problem) -> Answer:
     space, v = space_near(problem, problem.guess)
     parameters, levels = space.full_parameters(v), delta_levels(problem, problem.delta_start)
 
-    def answer_at(delta: float) -> Answer:
+    def answer_at(delta):
         nonlocal history
         mesh = space.mesh
         answer = _solve_from(problem, parameters, delta, mesh.edges, mesh.scheme.name)

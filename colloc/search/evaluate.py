@@ -240,7 +240,7 @@ def _errors_of_samples(
     motion = ReducedMotion(control.dynamics, answer.mesh, shapes, aims.integrals)
     scale = np.array([control.unscale(1.0), 1 / control.unit, 1.0, control.unit])
 
-    def values(v: np.ndarray) -> np.ndarray:
+    def values(v):
         period = motion.values(v, delta)
         both = aims.objective(period), EFFICIENCY(period)
         return scale * [*both, period["distance"], period["work"]]
@@ -562,7 +562,7 @@ class _Fit:
     def rms(self, off: np.ndarray) -> float:
         """Of places, or of headings if there are none."""
         which = int(not self.seen[0].any())
-        return float(np.sqrt((np.abs(off[which]) ** 2).sum() / self.seen[which].sum()))
+        return math.sqrt((np.abs(off[which]) ** 2).sum() / self.seen[which].sum())
 
     def rows(self, x: np.ndarray, motors: Fourier | None = None) -> np.ndarray:
         """What squares are least of: residuals over their noise, and x over its own."""

@@ -1,11 +1,9 @@
 """Many starts, cheaply told apart; the promising ones followed to the final delta.
 
-A start is optimised on a coarse mesh down to a delta at which friction is nearly dry. Where it
-meets a gait that an earlier start met at the same delta, it is dropped: it would go on as that one
-did. Every sixteen starts take turns with as many hops from the best gait so far (basin hopping:
-Wales and Doye, J. Phys. Chem. A 101, 1997). Beside them are a few small loops
-(`small_loops`), slow and so optimised at a smaller delta only. With inertia the optima of slow
-motion come first, which take a hundredth of the time, and hops from the best of them.
+As docs/search.md says. Where a start meets a gait that an earlier one met at the same delta, it
+would go on as that one did. Small loops (`small_loops`) are slow, and so optimised at a smaller
+delta only. Optima of slow motion take a hundredth of the time of those with inertia; hops from the
+best of them follow.
 """
 
 from __future__ import annotations
@@ -197,7 +195,7 @@ def follow_rest(problem: Problem, explored: Exploration) -> list[Iterate]:
 def starting_gaits(problem: Problem) -> Iterator[AnyGait]:
     """The guess, gaits known from three links and waves both ways, in turn with seeded Latin
     hypercubes, which have no end."""
-    body, limit, least = problem.body, problem.joint_limit, problem.smallest_shape_speed
+    body, limit = problem.body, problem.joint_limit
     # the two best ellipses of three equal links under isotropic friction: without them one harmonic
     # of other bodies is missed at times, as that of `problems/purcell.py`
     known = [
@@ -205,10 +203,11 @@ def starting_gaits(problem: Problem) -> Iterator[AnyGait]:
         for ab in ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
     ]
     known += [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
-    first = [problem.guess]
-    first += [to_class(problem.gait.start_class, gait, body, limit, least) for gait in known]
+    known = [to_class(problem, problem.gait.start_class, gait) for gait in known]
     seeds = map(partial(latin_hypercube_gait, problem, 0), itertools.count())
-    return itertools.chain(itertools.chain.from_iterable(zip(first, seeds, strict=False)), seeds)
+    return itertools.chain(
+        itertools.chain.from_iterable(zip([problem.guess, *known], seeds, strict=False)), seeds
+    )
 
 
 def in_slow_motion(problem: Problem) -> Problem | None:
@@ -217,7 +216,7 @@ def in_slow_motion(problem: Problem) -> Problem | None:
     if not problem.regime.froude or problem.regime.free or problem.motion or problem.grade:
         return None
 
-    def without_motors(aim: Objective) -> Objective:
+    def without_motors(aim):
         return Objective(re.sub(r"\bdriven_work\b", "work", aim.expression), "", aim.quantities)
 
     weak = {"torque_limit": None, "power_limit": None, "limits": ()}
@@ -270,7 +269,7 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
     new_gaits, drawn, n_new = starting_gaits(problem), list[AnyGait | None](), 0
     tried, improved, best, begin = 0, -OPTIONS.patience, 0.0, time.process_time()
 
-    def measure(candidates: list[Candidate]) -> None:
+    def measure(candidates):
         # on wheels that hardly resist the best at the last of these deltas may not be the best dry
         for candidate in (c for c in candidates if c.dry_objective == np.inf):
             dry_program = ReducedProgram(candidate.iterate.space, dry)
@@ -283,10 +282,10 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
             sketch(coarse, gait, False, deltas, levels)
     measure(last)
 
-    def is_turn_of_new(start: int) -> bool:
+    def is_turn_of_new(start):
         return start // (OPTIONS.starts // 2) % 2 == bool(slow)
 
-    def start_gait(start: int, number: int) -> tuple[AnyGait | None, bool]:
+    def start_gait(start, number):
         """The gait of a start, if there is one, and whether it is new: the one of that number. It
         depends on what came before alone, so more starts go wherever fewer do."""
         if not is_turn_of_new(start) and last:
@@ -299,7 +298,7 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
                 drawn[-1] = next(new_gaits)
         return drawn[number], True
 
-    def is_finished() -> bool:
+    def is_finished():
         n_met = min(last, key=_DRY).n_new if last else 0
         sure = n_met >= max(OPTIONS.patience / 2, n_new / OPTIONS.patience)
         # where a start takes long; elsewhere gaits that few starts meet are worth all of them
@@ -407,17 +406,17 @@ def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int
         )
     ends, left, run = list[tuple[Iterate, Candidate]](), list(candidates), active_run()
 
-    def is_promising(candidate: Candidate) -> bool:
+    def is_promising(candidate):
         # by what the best one promises, or has come to where it promised too much
         reached = min((optimum.objective for optimum, _ in ends), default=-np.inf)
         best = max(candidates[0].dry_objective, reached)
         return candidate.dry_objective <= best + (1 - OPTIONS.promising) * abs(best)
 
-    def report() -> None:
+    def report():
         best = _best([optimum for optimum, _ in ends]) or _best([c.iterate for c in left])
         run.report("follow", len(candidates) - len(left), len(candidates), best)
 
-    def add(candidate: Candidate) -> bool:
+    def add(candidate):
         """Follow a candidate; return whether that led to a new gait, which the body follows."""
         is_new = False
         left.remove(candidate)
@@ -528,12 +527,9 @@ def small_loops(problem: Problem) -> list[AnyGait]:
         if not any(abs(value - other.efficiency) < 1e-3 * value for other, _ in best):
             best.append((SmallGait(value, heading, here.rates[:, used], weights[used]), shape))
     best.sort(key=lambda pair: -pair[0].efficiency)
-    seeds, least = problem.gait.start_class, problem.smallest_shape_speed
-    size = 1.5 * 2 * np.pi * least
+    size = 1.5 * 2 * np.pi * problem.smallest_shape_speed
     return [
-        to_class(
-            seeds, Corners(small.path(shape, size, back=back)), body, problem.joint_limit, least
-        )
+        to_class(problem, problem.gait.start_class, Corners(small.path(shape, size, back=back)))
         for small, shape in best[:2]
         for back in (False, True)
     ]
@@ -552,7 +548,7 @@ def _shapes(problem: Problem) -> np.ndarray:
     first = np.take_along_axis(means, (means != 0).argmax(axis=1)[:, None], axis=1)
     means = np.unique(np.where(first < 0, -means, means) + 0.0, axis=0)
 
-    def admissible(mean: np.ndarray) -> np.ndarray:
+    def admissible(mean):
         factor = largest_factor(body, limit, mean[:, None], rest[:, None])
         return rest + (mean - rest) * min(1.0, factor)
 

@@ -285,7 +285,7 @@ def on_more_panels(iterate: Iterate) -> tuple[SearchSpace, np.ndarray] | None:
     if panels == 0:
         return None
 
-    def on(count: int) -> tuple[tuple[SearchSpace, np.ndarray], float]:
+    def on(count):
         stated = problem.with_(body=on_panels(problem.body, count))
         space = space_of(stated, old.edges, old.scheme, old.far)
         v = space.parameters(iterate.gait)

@@ -94,7 +94,7 @@ class Sensitivity:
     def facts(self) -> dict[str, Any]:
         """Plain numbers (JSON); None for what there is not."""
 
-        def plain(again: Again) -> dict[str, Any]:
+        def plain(again):
             every = (vars(again) | {"behind": again.behind}).items()
             return {name: None if x in (np.inf, -np.inf) or x != x else x for name, x in every}
 
@@ -152,7 +152,7 @@ def _on_meshes(answer: Answer) -> list[Callable[[Problem], float]]:
     problem, gait, delta, edges = answer.problem, answer.gait, answer.delta, answer.edges
     far = far_pairs(problem.body)
 
-    def on(parts: int, later: float = 0.0) -> Callable[[Problem], float]:
+    def on(parts, later=0.0):
         inner = edges[:-1, None] + (np.arange(parts) + later) / parts * np.diff(edges)[:, None]
         finer = np.unique([edges[0], *inner.flat, edges[-1]])
         optimum = optimise(*space_near(problem, gait, finer, answer.scheme, far), delta, FINE)
@@ -177,11 +177,11 @@ def _lagrangian(space: SearchSpace, v: np.ndarray, delta: float) -> Callable[[Pr
     named = zip(optimum.row_names, conditions.on_rows, strict=True)
     on_rows = {name: float(multiplier) for name, multiplier in named if multiplier}
 
-    def beyond(x: np.ndarray, low: np.ndarray, high: np.ndarray, on: np.ndarray) -> float:
+    def beyond(x, low, high, on):
         """Multipliers, positive at upper bounds, times (value - bound)."""
         return float(on @ (x - np.select([on > 0, on < 0], [high, low], x)))
 
-    def lagrangian(problem: Problem) -> float:
+    def lagrangian(problem):
         there = space_of(problem, space.edges, space.scheme, space.far)
         program = ReducedProgram(there, problem.delta)
         program.place_rows(v)

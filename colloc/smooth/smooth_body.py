@@ -87,7 +87,7 @@ class SmoothBody(Body):
     ) -> SmoothSolution:
         """The balance on panels; those adapt, unless settings of `solve_smooth` have a grid."""
 
-        def at(t: np.ndarray) -> np.ndarray:  # the phase counts the shapes
+        def at(t):  # the phase counts the shapes
             return t.astype(int)
 
         motion = Motion(
@@ -267,7 +267,7 @@ class ModalBody(SmoothBody):
     def bounded_angles(self) -> BoundedAngles:
         count = _PLACES_A_MODE * self.modes
 
-        def chebyshev(k: np.ndarray) -> np.ndarray:
+        def chebyshev(k):
             return 0.5 - 0.5 * np.cos(np.clip(k * np.pi / count, 0.0, np.pi))
 
         places, ends = chebyshev(np.arange(count + 1.0)), chebyshev(np.arange(count + 2) - 0.5)
@@ -398,10 +398,10 @@ class Wave(PrescribedBody):
         """Return the motion."""
         a, k, sign = self.amplitude, self.steepness, -1.0 if self.profile == "tanh" else 1.0
 
-        def phase(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+        def phase(s, t):
             return _TURN * (self.waves * s + sign * t)
 
-        def tanh_rate(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+        def tanh_rate(s, t):
             cosh = np.cosh(np.clip(k * np.sin(phase(s, t)), -300, 300))
             return -_TURN * (a * k * np.cos(phase(s, t)) / cosh**2)
 
@@ -515,7 +515,7 @@ class Concertina(PrescribedBody):
         w, (low, high), one = self.width, self.regions[0], self.bumps == 1
         rear_bump = self._one_bump if one else self._two_bumps
 
-        def theta(s: np.ndarray, t: np.ndarray, rate: bool = False) -> np.ndarray:
+        def theta(s, t, rate=False):
             (a, b, centre), (a_rate, b_rate, centre_rate) = rear_bump(t)
             x = 2 * ((s if one else np.minimum(s, 1 - s)) - centre) / w
             if rate:
@@ -525,7 +525,7 @@ class Concertina(PrescribedBody):
                 value = bump(x, a, b)
             return value if one else np.where(s > 0.5, -value, value)
 
-        def breaks(t: np.ndarray) -> np.ndarray:
+        def breaks(t):
             inner = rear_bump(t)[0][2] + w * np.linspace(-0.5, 0.5, 5)[:, None]
             ends = np.stack([np.full_like(t, low), *inner, np.full_like(t, high)])
             return ends if one else np.concatenate([ends, 1 - ends])
@@ -671,7 +671,7 @@ class CrawlerBody(SmoothBody):
     def _profile(self, x: Array, b: Array, *, slope: bool = False) -> Array:
         """``sum b_m phi_m(x)``, or its derivative, b ``(modes, n_time)``."""
 
-        def polynomial(powers: np.ndarray) -> Array:
+        def polynomial(powers):
             coefficients, value = namespace(b).matmul(powers, b), 0.0 * x
             for k in reversed(range(len(powers))):
                 value = value * x + coefficients[k : k + 1, :]

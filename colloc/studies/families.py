@@ -1,12 +1,11 @@
 """Families of certified gaits, each solved from its neighbours.
 
-Pareto fronts by the epsilon-constraint method, from their ends inwards: where neighbours are widest
-apart in an objective, the other one is maximised at a level between, from the neighbour that
-reaches it. What is no better than these leaves a gap. Only the gaits that are left are certified.
+Pareto fronts by the epsilon-constraint method, from their ends inwards: docs/howto/objectives.md
+says where, and each gait is sought from the neighbour that reaches its level. What is no better
+than these leaves a gap. Only the gaits that are left are certified.
 
-Steering: the best gait for every turn per cycle. After the straight gait, others are sought in
-the class without symmetry, each from its neighbour, or from the mirror image of the opposite turn.
-Controllers can interpolate between neighbours.
+Steering (docs/howto/steering.md): after the straight gait each is sought from its neighbour, or
+from the mirror image of the opposite turn.
 """
 
 from __future__ import annotations
@@ -184,13 +183,13 @@ def pareto_front(
     reachable = with_reachable_distance(problem)
     stated, intervals, certified = reachable.with_(least_distance=None), points - 1, list[_Point]()
 
-    def add(solution: Solution) -> None:
+    def add(solution):
         values, errors = _measure(solution, aims)
         certified.append(_Point(values, errors, solution.gait, solution.answer.edges, solution))
         if progress is not None:
             progress(len(certified), solution)
 
-    def optimum(which: int, level: float, near: _Point) -> _Point:
+    def optimum(which, level, near):
         at_least = *stated.at_least, (aims[which], level)
         asked = stated.with_(objective=aims[1 - which], at_least=at_least, delta_start=stated.delta)
         space, v = space_near(asked, near.gait, near.edges)
@@ -436,7 +435,7 @@ def steer(
         )
     check_count(starts=starts)
 
-    def member(turn: float, stated: Problem, starts: int = starts) -> Solution:
+    def member(turn, stated, starts=starts):
         solution = solve_member(stated, starts)
         if progress is not None:
             progress(turn, solution)
@@ -452,9 +451,7 @@ def steer(
     lopsided = one_sided(problem.joint_limit) or (joints is not None and any(joints.rest))
     mirrors = ANTIPODAL in problem.body.symmetries and not lopsided
 
-    def family(
-        stated: Problem, wanted: Sequence[float], known: dict[float, Solution]
-    ) -> tuple[Solution, ...]:
+    def family(stated, wanted, known):
         """Solve outwards from known members, or from all starts if there is none."""
         for turn, inner in _outwards(wanted, 0.0):
             begin = known[inner].gait if inner in known else None

@@ -127,7 +127,7 @@ def _read(problem: Stated) -> ProblemFile:
 
 
 def reporter(verbose: bool, progress: Callable[..., object] | None) -> Callable[..., None]:
-    def report(news: object) -> None:
+    def report(news):
         if verbose:
             print(news, flush=True)
         if progress is not None:
@@ -341,7 +341,7 @@ def run_guess(
     begin, cpu = time.perf_counter(), time.process_time()
     news = list[Progress]()
 
-    def check(end: Iterate) -> None:
+    def check(end):
         if not worth(end):
             raise _NotWorthIt(end)
 

@@ -111,7 +111,7 @@ class Visit:
 def read_journal(folder: Path) -> list[Visit]:
     """All visits in a folder, in order. `StoreError` if the journal cannot be read."""
 
-    def decode(row: dict[str, Any]) -> Visit:
+    def decode(row):
         attempts = [
             Attempt(str(a["origin"]), str(a["key"]), outcome_from(a["outcome"]))
             for a in row["attempts"]
@@ -157,11 +157,11 @@ class Work:
 
 def member(problem: Problem, gait: AnyGait) -> AnyGait | None:
     """Project a gait of any class into the problem's class; None if that is not admissible."""
-    body, gaits = problem.body, problem.gait
-    if gait.n_joint != body.n_joint or not gaits.free:
+    gaits = problem.gait
+    if gait.n_joint != problem.body.n_joint or not gaits.free:
         return None
     try:
-        similar = to_class(gaits, gait, body, problem.joint_limit, problem.smallest_shape_speed)
+        similar = to_class(problem, gaits, gait)
         space, v = space_near(problem, project_to_zero_rotation(problem, similar, problem.delta))
         projection = space.member(v)
         problem.with_(guess=projection)
@@ -208,11 +208,11 @@ def visit(work: Work) -> Visit:
         ):
             warm.append(key)
 
-    def enough() -> float:
+    def enough():
         best = best_attempt(attempts)
         return (1 + BETTER) * max(work.incumbent, best.outcome.value if best else 0.0)
 
-    def worth(end: Iterate) -> bool:
+    def worth(end):
         if end.delta > problem.delta:  # it would go on as an earlier start did from there
             known = any(same_gait(problem, end, other) for other in met)
             met.append(end)
@@ -225,7 +225,7 @@ def visit(work: Work) -> Visit:
         before, now = (fourier_series(problem, gait) for gait in (best.outcome.gait, end.gait))
         return distance(before, now, problem.body, problem.law) > SAME_GAIT
 
-    def solve(origin: str, gait: AnyGait, stated: Problem) -> None:
+    def solve(origin, gait, stated):
         key = start_key(gait) + ("r" if origin == RESCUE else "")
         if key in work.tried or key in {a.key for a in attempts}:
             return
@@ -680,7 +680,7 @@ def gait_class(gait: Fourier, body: Body, friction: Law) -> dict[str, Any]:
     """Columns of a study about a gait of a body with at least two joints or modes: symmetries
     (`colloc.gaits.gait`), whether it goes back the way it came, `winding`, `wave_direction`,
     `forward_share` and `class_name`."""
-    amplitude = float(np.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2)))
+    amplitude = math.sqrt(0.5 * np.sum(gait.cos**2 + gait.sin**2))
     close = _SAME * max(amplitude, 1e-12)
     image = reversed_in_time(swap_ends(gait, body)) if body.reversal is not None else None
     even = np.concatenate([gait.mean, gait.cos[:, 1::2].ravel(), gait.sin[:, 1::2].ravel()])

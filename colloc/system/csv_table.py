@@ -45,7 +45,7 @@ def read_table(path: Path) -> Table:
     lines = _text(path).splitlines()
     plain = [line for line in lines[: 4 * _MANY] if line.strip() and not _COMMENT.match(line)]
 
-    def fit(delimiter: str) -> tuple[float, float]:
+    def fit(delimiter):
         split = filter(None, (_split(line, delimiter) for line in plain[-_MANY:]))
         counts = sorted((sum(map(_is_number, row)) / len(row), len(row)) for row in split)
         return counts[len(counts) // 2] if counts else (0.0, 0.0)
@@ -92,7 +92,7 @@ def _first_row(rows: list[_Row], width: int, usual: list[list[str]]) -> int:
     columns = zip(*usual, strict=True)
     numeric = [j for j, x in enumerate(columns) if 2 * sum(map(_is_number, x)) >= len(usual)]
 
-    def is_data(row: _Row) -> bool:
+    def is_data(row):
         if row.comment or len(row.cells) != width or not numeric:
             return False
         numbers = [_is_number(row.cells[j]) for j in numeric]

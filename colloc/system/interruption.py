@@ -91,7 +91,7 @@ def _press_again() -> None:
 def _unraisable(before: Callable[[Any], object]) -> Callable[[Any], object]:
     """Have Ctrl-C in a weak reference's callback, where Python cannot raise it, come again."""
 
-    def hook(unraisable: Any) -> None:
+    def hook(unraisable):
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):
             before(unraisable)
             return

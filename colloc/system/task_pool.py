@@ -70,7 +70,7 @@ def _start_worker() -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
 
-    def leave() -> None:
+    def leave():
         wait_for_handles([parent.sentinel])
         os._exit(1)
 

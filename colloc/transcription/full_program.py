@@ -147,7 +147,7 @@ class FullProgram(Program):
         objectives = aims.objective, *dict(aims.at_least)
         names = sorted({name for aim in objectives for name in aim.uses})
 
-        def period(*parts: ca.SX) -> ca.SX:
+        def period(*parts):
             totals, fraction, turn = {}, admissible.fraction, self.dynamics.turn
             for name, part in zip(names, parts, strict=True):
                 if name == "rotation":
@@ -163,7 +163,7 @@ class FullProgram(Program):
         speed = self.repeat(partial(_square_of_speed, gaits, n_joint), [p])
         if not gaits.linear:
 
-            def deviation(w: ca.SX) -> ca.SX:
+            def deviation(w):
                 given = ca.vertcat(*(a for row in gaits.coefficients(w, n_joint) for a in row))
                 return w[gaits.n_wave : gaits.n_wave + given.numel()] - given
 
@@ -229,7 +229,7 @@ class FullProgram(Program):
             part.ravel() for part in (layout.directions, layout.spins, layout.vx, layout.vy)
         )
 
-        def half(phi: ca.SX, w: ca.SX, length: Any) -> ca.SX:
+        def half(phi, w, length):
             """l/2 w sin phi, l/2 w cos phi; with inertia l/2 cos phi, l/2 sin phi, too."""
             half = 0.5 * length * ca.vertcat(ca.sin(phi), ca.cos(phi))
             return ca.vertcat(half * w, half[[1, 0]]) if inertial else half * w
@@ -240,7 +240,7 @@ class FullProgram(Program):
         groups = chain.contact.groups(self.dynamics.law)
         self.contacts = [(group.rows, self._contact(group)) for group in groups]
 
-        def load(theta: ca.SX, vx: ca.SX, vy: ca.SX, mass: Any) -> ca.SX:
+        def load(theta, vx, vy, mass):
             """m g in the plane, and its power."""
             pull: Any = self.dynamics.regime.pull(theta)
             c, s = ca.cos(theta), ca.sin(theta)
@@ -252,7 +252,7 @@ class FullProgram(Program):
             tail = np.tile(layout.directions[0], chain.n_link)
             self.load = self.repeat(load, [tail, vx, vy], [chain.mass_column()])
 
-        def lever(phi: ca.SX, nx: ca.SX, ny: ca.SX, length: Any) -> ca.SX:
+        def lever(phi, nx, ny, length):
             """l/2 e x N of the force at a joint on one of its links."""
             return 0.5 * length * (ca.cos(phi) * ny - ca.sin(phi) * nx)
 
@@ -265,7 +265,7 @@ class FullProgram(Program):
             ]
             return
 
-        def swing(w: ca.SX, vx: ca.SX, vy: ca.SX, x: ca.SX, y: ca.SX, mass: Any, J: Any) -> ca.SX:
+        def swing(w, vx, vy, x, y, mass, J):
             """J w + m x cross v."""
             return J * w + mass * (x * vy - y * vx)
 
@@ -273,7 +273,7 @@ class FullProgram(Program):
         inertia = chain.mass_column(), chain.inertia_column()
         self.swing = self.repeat(swing, [w, vx, vy, *place], inertia)
 
-        def change(tail: ca.SX, centre: ca.SX, momenta: ca.SX, pace: ca.SX) -> ca.SX:
+        def change(tail, centre, momenta, pace):
             """Velocity of the centre of mass in tail axes, and the rates of the momenta."""
             (phi, w), (vx, vy, fx, fy, moment) = ca.vertsplit(tail), ca.vertsplit(centre)
             c, s = ca.cos(phi), ca.sin(phi)
@@ -294,7 +294,7 @@ class FullProgram(Program):
             forces.append(layout.friction[contact.couples(rows)])
         speed = np.repeat(layout.speed, len(links), axis=0)
 
-        def function(moving: ca.SX, force: ca.SX, speed: ca.SX, *numbers: Any) -> ca.SX:
+        def function(moving, force, speed, *numbers):
             (phi, w, vx, vy, *place), force = ca.vertsplit(moving), ca.vertsplit(force)
             along, offset, cos, sin, length, pressure = numbers
             slow = self.delta * speed if self.relative else self.delta
@@ -347,7 +347,7 @@ class FullProgram(Program):
         """Values at every point, ``(n_value, n_point)``."""
         variables, shape = self._shape(formula.needs_forces)
 
-        def value(*local: ca.SX) -> ca.SX:
+        def value(*local):
             q, r, moments, froude = shape(*local)
             slow = self.delta * ca.norm_2(r) if self.relative else self.delta
             now = self.dynamics
@@ -369,7 +369,7 @@ class FullProgram(Program):
             return moments, lambda phi, w, moments: (ca.diff(phi), ca.diff(w), moments, None)
         torques = torque_function(self.chain, self.dynamics.law)
 
-        def shape(phi: ca.SX, w: ca.SX, rates: ca.SX, momenta: ca.SX, pace: ca.SX) -> _Shape:
+        def shape(phi, w, rates, momenta, pace):
             q, r, froude = ca.diff(phi), ca.diff(w), self._froude(pace)
             return q, r, torques(q, r, rates, momenta, self.delta, froude), froude
 

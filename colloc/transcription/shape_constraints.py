@@ -195,7 +195,7 @@ def near_peaks(
     worst instants there, ``(n,)`` each."""
     lower, upper = checks.bounds(limit)
 
-    def excess(which: np.ndarray, values: np.ndarray) -> np.ndarray:
+    def excess(which, values):
         return np.maximum(values - upper[which], lower[which] - values)
 
     fine, every = np.linspace(0.0, 1.0, SAMPLES + 1), np.arange(len(checks.names))
@@ -217,7 +217,7 @@ def near_peaks(
     peak = (most >= around[:, :-2]) & (most >= around[:, 2:])
     which, cells = np.nonzero((most > -_NEAR) | (peak & (most > -_FAR)))
 
-    def at_times(t: np.ndarray) -> np.ndarray:
+    def at_times(t):
         of, values = np.repeat(which, t.shape[1]), np.empty(t.size)
         for at in (slice(k, k + _BLOCK) for k in range(0, t.size, _BLOCK)):
             shapes = checks.shapes(gaits, table, of[at], t.ravel()[at])
@@ -258,7 +258,7 @@ class Placed(NamedTuple):
         left, h, checks = mesh.edges[cells], mesh.h[cells], self.checks
         step, every, held = _STEP * h, np.tile(which, 3), np.tile(held, 3)
 
-        def heights(t: np.ndarray) -> np.ndarray:
+        def heights(t):
             times = np.concatenate([t - step, t, t + step])
             shapes = checks.shapes(gaits, table, every, times)
             return checks.values(every, shapes, held).reshape(3, -1)

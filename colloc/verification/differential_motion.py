@@ -166,10 +166,10 @@ def integrate_period(
     near: Any = None
     first = last = left = 0.0
 
-    def inside(t: float) -> float:
+    def inside(t):
         return min(max(t, first + ONE_SIDED), last - ONE_SIDED)  # rates may jump at the ends
 
-    def slope(t: float, state: np.ndarray) -> np.ndarray:
+    def slope(t, state):
         nonlocal near, left
         left -= 1
         if left < 0:
@@ -266,7 +266,7 @@ class _Gait:
     def integrals(self, ran: Course, error: float, motion: int = 0) -> _Integrals:
         """Of quantities that need forces, along one of the motions of a run."""
 
-        def densities(t: np.ndarray) -> np.ndarray:
+        def densities(t):
             if not self.quantities:
                 return np.empty((0, t.size))
             now = self.instants(t, ran.at(t)[7 * motion :])
@@ -347,9 +347,7 @@ class GaitOnSlope(_Gait):
     ) -> Course:
         """The states through a cycle, from the first of them at its begin."""
 
-        def rates(
-            t: float, state: np.ndarray, near: np.ndarray | None
-        ) -> tuple[np.ndarray, np.ndarray]:
+        def rates(t, state, near):
             at = self.body, self.friction, self.slope, (*self.path(np.array([t])), self.delta)
             solved, now, _, by_theta = balance_on_slope(*at, state[:1], start=near)
             if not solved.converged.all():
@@ -392,7 +390,7 @@ class GaitOnSlope(_Gait):
 
         theta_0 = self.path.theta  # type: ignore[attr-defined]
 
-        def run(aim: float) -> tuple[tuple[Course, float], Numbers]:
+        def run(aim):
             ran = self.integrate(theta_0, aim, _LONGEST / instants)
             theta, climb, aside, spent, *_ = (ran.states[:, -1] - ran.states[:, 0]).tolist()
             way = self.slope.travel_along(complex(climb, aside))
@@ -642,7 +640,7 @@ class GaitWithInertia(_Gait):
         return self.rough_period(np.zeros(3))
 
     def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray) -> PeriodicRun:
-        """A cycle that leaves the momenta as they are, to an error, from a `RoughPeriod`."""
+        """To an error `aim`, from the momenta and slopes of a `RoughPeriod`."""
         start, before = near, np.inf
         for _ in range(_MOST_STEPS):
             course = self.run(start, aim)
@@ -699,7 +697,7 @@ class GaitWithInertia(_Gait):
         start, ends, slopes = self.find_period(begin)
         period = {"period": self.froude**-0.5}
 
-        def run(aim: float) -> tuple[PeriodicRun, Numbers]:
+        def run(aim):
             nonlocal start
             ran = self.periodic_run(start, aim, slopes)
             start = ran.momenta

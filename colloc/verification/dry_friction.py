@@ -117,7 +117,7 @@ def dry_balance(body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarra
     to_tail = np.tile(np.eye(3), (largest.size, 1, 1))
     to_tail[:, 0, 2], to_tail[:, 1, 2] = gy, -gx
 
-    def tangent(y: np.ndarray) -> _Tangent:
+    def tangent(y):
         moved = z + np.einsum("tij,jt->it", to_tail, y)
         now = instant(body, law, angles, rates, moved, _SMOOTHED)
         gradient = -np.einsum("tji,jt->it", to_tail, net_force(now.posture, now.force))
@@ -125,7 +125,7 @@ def dry_balance(body: Chain, friction: Law, angles: np.ndarray, rates: np.ndarra
         power = total_power(now.velocity, now.force)[0] * (1 - _ROUNDING)
         return _Tangent(y, power, gradient, to_tail.transpose(0, 2, 1) @ slope @ to_tail)
 
-    def cut_along(goal: np.ndarray) -> tuple[_Tangent, np.ndarray]:
+    def cut_along(goal):
         """A tangent whose gradient is near a goal ``(3, n_time)``, by damped Newton steps, and what
         it misses of it."""
         best, damping = centre, np.ones(largest.size)
@@ -212,7 +212,7 @@ def dry_friction(
     angles, rates = path(t)
     dry, posture = dry_balance(body, friction, angles, rates), body.posture(angles)
 
-    def centre_velocity(z: np.ndarray) -> np.ndarray:
+    def centre_velocity(z):
         x, y = body.centre_velocity(posture, body.velocity(posture, rates, z))
         return (x + 1j * y)[0]
 
@@ -222,7 +222,7 @@ def dry_friction(
     spin = np.abs(dry.z[2] - z[2]) + dry.apart[2]
     step = np.diff(t, append=t[0] + 1.0)
 
-    def integral(values: np.ndarray) -> float:
+    def integral(values):
         """Upper bound, by the worse of neighbours."""
         return float(step @ np.maximum(values, np.roll(values, -1)))
 

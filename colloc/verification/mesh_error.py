@@ -3,9 +3,7 @@
 On an interval the scheme takes the rate of a state to be the polynomial through its values at the
 nodes; the integral of the *defect*, that polynomial less the true rate, is the error it adds.
 
-A gait can be tried on any mesh, so a mesh is planned as a whole: knots are *moved* onto the kinks
-where links begin to stick or slip, intervals with the largest errors are *split*, for schemes with
-*more nodes* too, of which the mesh with the fewest points wins.
+A gait can be tried on any mesh, so a mesh is planned as a whole (docs/developers/error_control.md).
 """
 
 import re
@@ -356,7 +354,7 @@ def kink_phases(
     make no kinks.
     """
 
-    def slowness(t: np.ndarray, z: np.ndarray) -> np.ndarray:
+    def slowness(t, z):
         if not (isinstance(body, Chain) and body.law(friction).regularised):
             return np.empty((0, t.size))
         angles, rates = path(t)
@@ -437,7 +435,7 @@ def plan_mesh(
         rules += [scheme(f"{match[1]}-{s}") for s in more[1:] if s <= _MOST_NODES]
     best: MeshPlan | None = None
 
-    def try_rule(rule: Scheme, refine: Callable[..., Any], *start: np.ndarray) -> None:
+    def try_rule(rule, refine, *start):
         """Take what a rule leads to if it is the first, or reaches the request by fewer points."""
         nonlocal best
         budget = most_points if best is None else min(most_points, best.points / _HANDICAP)
@@ -465,8 +463,7 @@ def plan_mesh(
         switches = not control.dynamics.law.reversible and (rule.left or rule.right)
         targets = on_knots = kinks[:0] if switches else kinks
         if on_knots.size:
-            # and the knots that the kinks have just left: collocation errs there in the optimiser's
-            # favour, and moving the knot after the kink repeats the chase
+            # and the knots that the kinks have just left (docs/developers/error_control.md)
             nearest = mesh.edges[np.abs(mesh.edges[:, None] - kinks).argmin(axis=0)]
             just_left = np.abs(nearest - kinks) < _LEFT * np.diff(mesh.edges).mean()
             targets = np.union1d(kinks, nearest[just_left])

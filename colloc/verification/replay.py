@@ -1,9 +1,8 @@
 """Independent replay of a gait: distance, work and rotation from the joint angles alone.
 
-It shares nothing with collocation but the physics at an instant: velocities at five instants of
-panels, Simpson's rule on each and on its halves, and the error that leaves. Where several balance
-an instant, it follows one branch in time, and says how far the others would lead
-(`colloc.mechanics.solution_branches`).
+It shares nothing with collocation but the physics at an instant (docs/developers/error_control.md).
+Where several velocities balance an instant, it follows one branch in time, and says how far the
+others would lead (`colloc.mechanics.solution_branches`).
 
 A kink of stick and slip may lie where halving its panel changes nothing, and halving that again
 much. So a panel is also judged by what halving would change if it lay one or two instants earlier
@@ -283,9 +282,7 @@ def replay(
     law = body.law(friction) if isinstance(body, Chain) else friction
     residual, shares = 0.0, np.full(len(limits.names), -np.inf)
 
-    def state_at(
-        t: np.ndarray, start: np.ndarray | None, *, whole: bool = False
-    ) -> tuple[np.ndarray, ...]:
+    def state_at(t, start, *, whole=False):
         """`Panels` z, rates, joint_power and apart at instants t, from tail velocities ``(3,
         t.size)``; of several motions the nearest, or of a `whole` period the branch in time."""
         nonlocal residual, shares

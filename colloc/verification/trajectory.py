@@ -73,7 +73,7 @@ def plan_trajectory(
         )
     period, level = count / rate, 0.0
 
-    def excess(level: float) -> float:
+    def excess(level):
         return float(np.maximum(level, slowest).mean()) - period
 
     if excess(0.0) < 0:

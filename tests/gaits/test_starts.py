@@ -125,7 +125,7 @@ def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class
         "bilateral": [[0.4, 0.5, 0.45], [-0.4, -0.42, -0.45]],
     }
     small = Corners(np.array(corners[symmetry]), symmetry)
-    laid = starts.to_class(gait_class(3, symmetry), small, THREE)
+    laid = starts.to_class(Problem("short", body=THREE), gait_class(3, symmetry), small)
     assert laid.length == pytest.approx(0.2 * np.pi, rel=2e-3)
     np.testing.assert_allclose(
         laid.angles(PHASES[:-1]).mean(axis=1), small.angles(PHASES[:-1]).mean(axis=1), atol=1e-3
