@@ -238,10 +238,9 @@ class Problem:
         self._check_aims()
         regime.check(self)
         self._check_gaits()
-        if self.guess is None and self.gait.free:
-            self._set(guess=default_guess(self))
-        elif self.guess is None:
-            self._set(guess=self.gait.member(np.empty(0), n_joint))
+        if self.guess is None:
+            free, none = self.gait.free, np.empty(0)
+            self._set(guess=default_guess(self) if free else self.gait.member(none, n_joint))
         check_kind("guess", self.guess, gait_fields.GAITS)
         check_guess(self)
 

@@ -236,8 +236,7 @@ def write_export(
         rows[-1].append(torques)
         if ramp:
             joints = problem.joint_path(parts[0].angles, trajectory.period * parts[0].speeds)
-            theta = solution.gait.theta or 0.0  # the initial heading on a slope
-            pull = problem.regime.pull(np.full((1, parts[0].time.size), theta))
+            pull = problem.regime.pull(np.full((1, parts[0].time.size), solution.gait.theta or 0.0))
             rows[0].append(robot.torque_unit * quasi_static_torques(solution, *joints, pull))
         for row in rows:
             row.append(row[2] * row[1])

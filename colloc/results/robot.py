@@ -100,7 +100,7 @@ class _MotionWithInertia:
     """
 
     def __init__(self, solution: Solution, froude: float) -> None:
-        from colloc.verification.differential_motion import GaitWithInertia  # slow to import
+        from colloc.verification.differential_motion import GaitWithInertia
 
         regime, self._gait = solution.problem.regime, solution.gait
         moving = solution.played_by(GaitWithInertia, froude=froude, regime=regime)
@@ -449,11 +449,9 @@ def _hints(problem: Problem, speed_used: float) -> Iterator[str]:
         torque = largest_moments(problem.body, problem.friction, problem.grade)
     if isinstance(gait, Harmonic) and problem.body.bounded_angles.rows.shape == (n, n):
         speed = 2 * math.pi * gait.harmonics * half
-    power = torque * np.minimum(speed, problem.largest_speeds or np.inf)
+    bounds = speed, torque, torque * np.minimum(speed, problem.largest_speeds or np.inf)
     units = _units(problem)
-    for (name, (called, unit, size)), bound in zip(
-        units.items(), (speed, torque, power), strict=True
-    ):
+    for (name, (called, unit, size)), bound in zip(units.items(), bounds, strict=True):
         limit = getattr(problem, name)
         if not isinstance(limit, tuple):  # of all joints: it matters if it does to one of them
             bound = bound.max(keepdims=True)

@@ -273,7 +273,6 @@ class Solution:
         ProblemError
             If the problem states no pace: without inertia the first period is like all others.
         """
-        # loads what integrates, which few need
         from colloc.verification.differential_motion import motion_from_rest
 
         p = self.problem

@@ -186,8 +186,7 @@ def _rows(
         # the body is no longer than that
         yield "statics", lean, 1.0, f"{meaning}reported, not judged"
     if fine.multipliers:
-        meaning = "largest Floquet multiplier: "
-        meaning += "share of a small momentum change left after a cycle"
+        meaning = "largest Floquet multiplier: share of a small momentum change left after a cycle"
         yield "stability", float(np.abs(fine.multipliers).max()), 1.0, meaning
     if claimed is not None:
         gap = claimed / fine.value - 1

@@ -57,10 +57,14 @@ from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.verification.mesh_error import plan_mesh
 
 
-def _fit_gait(problem: Problem, gait: Any, **how: Any) -> FittedGait:
+def _fit_gait(
+    problem: Problem, gait: Given, period: float | None, harmonics: int | None, degrees: bool
+) -> FittedGait:
     """A gait of the motors; markers may tell the angles of joints, if these are the motors."""
     body = problem.body if isinstance(problem.body, Chain) and not problem.joint_map else None
-    return fitted_gait(gait, problem.n_motor, body=body, **how)
+    return fitted_gait(
+        gait, problem.n_motor, period=period, harmonics=harmonics, degrees=degrees, body=body
+    )
 
 
 def evaluate(
@@ -114,8 +118,7 @@ def evaluate(
         )
     if schedule(problem.body):
         raise ProblemError(f"{problem.name} is a prescribed motion: it has no other gaits.")
-    how: Any = {"period": period, "harmonics": harmonics, "degrees": degrees}
-    fitted = _fit_gait(problem, getattr(gait, "motor_gait", gait), **how)
+    fitted = _fit_gait(problem, getattr(gait, "motor_gait", gait), period, harmonics, degrees)
     series = fitted.gait
     # servo angles about a right angle: all joints bent alike, and links that cross
     if fitted.centre:
@@ -407,8 +410,7 @@ def identify(
     length = length or getattr(problem.robot, "length", None)
     if length is not None:
         check_finite(positive=True, length=length)
-    how: Any = {"period": period, "harmonics": harmonics, "degrees": degrees}
-    fitted = _fit_gait(problem, path := Path(record), **how)
+    fitted = _fit_gait(problem, path := Path(record), period, harmonics, degrees)
     read: Any = fitted.record
     measured, used = _measured(path, read, length)
     fit = _Fit(problem.without_robot, measured, fitted.gait, read.time / fitted.period)
