@@ -3,10 +3,9 @@ to measured coefficients, a Stribeck curve of the speed in each direction,
 
     mu(v) = c_0 + c_1 exp(-v / v_S) + c_2 (1 - exp(-v / v_S)) + c_3 v,
 
-dry friction, what is lost or gained of it within the speed v_S, and drag. No c is negative, so that
-friction takes energy at every speed (non-negative least squares). Of the curves of one to three
-terms Bayes' information criterion takes one, with at least two more samples than numbers; v_S is
-one for all directions.
+with no c negative, so that friction takes energy at every speed (non-negative least squares). Of
+the curves of one to three terms Bayes' information criterion takes one, with at least two more
+samples than numbers; v_S is one for all directions.
 """
 
 from __future__ import annotations

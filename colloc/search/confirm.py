@@ -4,7 +4,6 @@ The full program is solved on the final mesh, from the gait that the search foun
 multipliers of the reduced program and, for the equations, those that come closest to stationarity.
 Both have the same solutions, so a few steps confirm it. Where IPOPT strays from a gait at which the
 first-order conditions hold, as at a kink, whose second derivatives mislead it, the gait is kept.
-Where a solve fails, the message says why: which equation, which link, which time window.
 """
 
 from __future__ import annotations
@@ -414,8 +413,7 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
         text = f"First-order conditions hold ({where}); {ended}."
         return program, replace(before, status=STATIONARY), text
     if iterate.optimal and feasible:
-        # with friction as steep as 1 / delta, multipliers of the balance are known to fewer digits
-        # than the conditions need
+        # friction is as steep as 1 / delta: multipliers are known to fewer digits than needed
         where = f"KKT error {here.kkt_error:.1e}; {before.kkt_error:.1e} on the {kind} program"
         text = f"First-order conditions hold in the reduced space ({where}); {ended}."
         return program, here, text

@@ -6,8 +6,7 @@ the last gait, until constraints, trust region and gait settle. Pairs of links m
 are constrained only once they cross (a cutting-plane method): a chain of n links has (n - 2)(n -
 3)/2 such pairs, and few of them ever come near each other.
 
-Every mesh is planned as a whole for the gait at hand (`colloc.verification.mesh_error`), a smooth
-body's panels with it, and the gait optimised on it, until it needs no other.
+Every mesh is planned for the gait at hand (`colloc.verification.mesh_error`), and panels with it.
 """
 
 import time

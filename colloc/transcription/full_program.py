@@ -17,10 +17,10 @@ mass m_i, e_i = (cos phi_i, sin phi_i), n_i = (-sin phi_i, cos phi_i), and joint
     theta' = w_0,   D' = sum m_i v_i . ahead,   W' = - sum (f_i . v_i + c_i w_i)  collocated
     N = 0, M = 0 at both free ends;   D(0) = W(0) = 0;   theta(end) = +-theta(0)  boundary
 
-Friction is stated as (f - friction)/(its secant), which is mild where the law is nearly a step.
-theta, and distances of gaits that turn, are seen from axes that turn evenly. *Ahead* is +x on level
-ground, where the first orientation is free, so that maximising D turns the motion there. A load g
-is that of a slope. With inertia the momenta P of the body take the place of N and M::
+Friction is stated as (f - friction)/(its secant), docs/collocation.md. theta and distances of gaits
+that turn are seen from axes that turn evenly. *Ahead* is +x on level ground, where the first
+orientation is free, so that maximising D turns the motion there. A load g is that of a slope.
+With inertia the momenta P of the body take the place of N and M::
 
     P = (sum m_i v_i in the tail's axes, sum J_i w_i + m_i x_i x v_i)
     P' = (sum f_i + m_i g, sum c_i + x_i x f_i) / Fr + turning of the axes        collocated
