@@ -326,13 +326,12 @@ class Identified:
     def line(self) -> str:
         """For the problem file."""
         body: Any = self.problem.body
-        feet = getattr(body, "feet", ())
-        if not any(foot.friction is not None for foot in feet):
-            return f"friction={self.problem.friction!r}"
-        plain = tuple(replace(foot, weight=None) for foot in feet)  # said if they differ
-        text = repr(plain if replace(body, feet=plain).feet == feet else feet)
-        text = re.sub(r", (weight=None|(offset|angle|extent)=0\.0)\b", "", text)
-        return "feet=" + re.sub(r"(?<=place=)0\.\d+", lambda x: f"{float(x[0]):.6g}", text)
+        feet, text = getattr(body, "feet", ()), f"friction={self.problem.friction!r}"
+        if any(foot.friction is not None for foot in feet):
+            plain = tuple(replace(foot, weight=None) for foot in feet)  # said if they differ
+            text = f"feet={plain if replace(body, feet=plain).feet == feet else feet!r}"
+            text = re.sub(r", (weight=None|(offset|angle|extent)=0\.0)\b", "", text)
+        return re.sub(r"\d+\.\d{7,}", lambda x: f"{float(x[0]):.6g}", text)
 
     def facts(self) -> dict[str, Any]:
         """Plain numbers (JSON); None for an error that is infinite."""
