@@ -21,4 +21,4 @@ PROBLEM = Problem(
     delta=4e-4,
 )
 
-REFERENCE = Reference(0.3506, 0.001, "design notes, section 5: solved and replayed on 3200 nodes")
+REFERENCE = Reference(0.3506, 0.001, "solved, and replayed on 3200 nodes")

@@ -13,4 +13,4 @@ PROBLEM = Problem(
     friction=Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0),
     delta=1e-4,
 )
-REFERENCE = Reference(0.737066, 1e-6, "design notes, section 8; composite Gauss panels")
+REFERENCE = Reference(0.737066, 1e-6, "by composite Gauss panels")

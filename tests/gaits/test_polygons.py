@@ -94,8 +94,7 @@ def test_polygons_have_the_corners_and_the_symmetry_they_promise(corners, axis):
 
 
 def test_replay_of_the_small_triangle_reaches_two_fifths():
-    """Joints moved one after the other and undone together: d = e/12, W = 5 e/24 (design notes,
-    section 5)."""
+    """Joints moved one after the other and undone together: d = e/12, W = 5 e/24."""
     for c, e in ((2.2, 1e-3), (2.5, 1e-3)):
         gait = Corners(np.array([[c + e, c, c], [-c, -c, -c - e]]))
         assert gait.length == pytest.approx((2 + np.sqrt(2)) * e)
