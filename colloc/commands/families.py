@@ -100,7 +100,7 @@ def multistart(options: argparse.Namespace) -> int:
     from colloc.search.explore import with_reachable_distance
     from colloc.studies.solve import run_starts
 
-    problem = with_reachable_distance(problem)
+    problem, _ = with_reachable_distance(problem)
     archive = open_archive(problem, path)  # or refused, before anything is solved
     search = options.sampler, options.seed, options.starts
     done = archive.done(*search, retry=options.retry)

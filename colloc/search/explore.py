@@ -110,10 +110,12 @@ def first_optimum(problem: Problem, gait: AnyGait) -> Iterate:
     return optimum
 
 
-def explore(problem: Problem, starts: int | None = None) -> Exploration:
+def explore(
+    problem: Problem, starts: int | None = None, known: Sequence[AnyGait] = ()
+) -> Exploration:
     """The best gaits of a problem's class that so many starts, and at most three times as many,
-    lead to: by default 32, with inertia 96 where no optima of slow motion are known, or fewer once
-    some of them have met the best one.
+    lead to, and gaits that are known: by default 32, with inertia 96 where no optima of slow motion
+    are known, or fewer once some of them have met the best one.
 
     Where they shrink until nobody sees them move, the search begins anew among gaits at least as
     large as the best optimum of finite size; without one, as large as the default guess is, or as
@@ -121,7 +123,7 @@ def explore(problem: Problem, starts: int | None = None) -> Exploration:
     """
     run = active_run()
     try:
-        any_size = _follow_promising(problem, *multistart(problem, starts))
+        any_size = _follow_promising(problem, *multistart(problem, starts, known))
         if problem.shrinking or is_visible(any_size.optima[0].gait) or not run.has_time():
             return any_size
         finite = next((each for each in any_size.optima if is_visible(each.gait)), None)
@@ -134,7 +136,7 @@ def explore(problem: Problem, starts: int | None = None) -> Exploration:
                 size = min(OPTIONS.min_size, stated.guess.shape_speed)
                 size = max(size, problem.smallest_shape_speed)
                 stated = stated.with_(smallest_shape_speed=size)
-            large = _follow_promising(stated, *multistart(stated, starts))
+            large = _follow_promising(stated, *multistart(stated, starts, known))
         except CollocError:
             return any_size  # nothing moves as much
     finally:
@@ -157,22 +159,25 @@ def explore(problem: Problem, starts: int | None = None) -> Exploration:
 
 
 @checkpoint
-def farthest_distance(problem: Problem) -> float:
-    farthest = problem.with_(objective="distance", least_distance=None, shrinking=True)
-    return explore(farthest, OPTIONS.reach_starts).optima[0].value
+def farthest(problem: Problem) -> list[Iterate]:
+    """Optima of the distance, the farthest first."""
+    of_distance = problem.with_(objective="distance", least_distance=None, shrinking=True)
+    return explore(of_distance, OPTIONS.reach_starts).optima
 
 
-def with_reachable_distance(problem: Problem) -> Problem:
+def with_reachable_distance(problem: Problem) -> tuple[Problem, list[AnyGait]]:
     """The problem with its `least_distance` among `at_least`: all of it, or half of what the
-    farthest gait goes, if that is less. How far that goes is known first, so that no search is for
-    a distance that no gait reaches."""
+    farthest gait goes, if that is less; and the gaits that go farthest, for a search to begin from,
+    as few others may go as far. They are known first, so that no search is for a distance that no
+    gait reaches."""
     stated = {aim.name for aim, _ in problem.at_least}
     if problem.least_distance is None or "distance" in stated or not problem.gait.free:
-        return problem
-    farthest, least = farthest_distance(problem), problem.least_distance
-    least = least if farthest >= least else 0.5 * farthest
+        return problem, []
+    optima, least = farthest(problem), problem.least_distance
+    least = least if optima[0].value >= least else 0.5 * optima[0].value
     active_run().begin_again()
-    return problem.with_(at_least=(*problem.at_least, ("distance", least)))
+    reachable = problem.with_(at_least=(*problem.at_least, ("distance", least)))
+    return reachable, [each.gait for each in optima]
 
 
 def follow_rest(problem: Problem, explored: Exploration) -> list[Iterate]:
@@ -243,7 +248,9 @@ def same_gait(problem: Problem, a: Iterate, b: Iterate) -> bool:
     return are_one(problem, one, other)
 
 
-def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], int]:
+def multistart(
+    problem: Problem, starts: int | None, known: Sequence[AnyGait] = ()
+) -> tuple[list[Candidate], int]:
     """Candidates on a coarse mesh, best first, and the number of starts, at least one."""
     slow = slow_optima(problem)
     run, ahead = active_run(), active_run().ahead
@@ -276,8 +283,9 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
             objective = dry_program.objective(candidate.iterate.v)
             candidate.dry_objective = float(np.nan_to_num(objective, nan=np.inf))
 
-    for done, gait in enumerate(slow):
-        run.report("explore", done, len(slow) + count, _best([c.iterate for c in last]))
+    first = [*known, *slow]
+    for done, gait in enumerate(first):
+        run.report("explore", done, len(first) + count, _best([c.iterate for c in last]))
         with suppress(CollocError):
             sketch(coarse, gait, False, deltas, levels)
     measure(last)
@@ -329,7 +337,7 @@ def multistart(problem: Problem, starts: int | None) -> tuple[list[Candidate], i
         tried += 1
         # as a rule loops shrink further on their way down
         shown = [*last, *loops] if problem.shrinking else last
-        done, all_starts = len(slow) + tried, len(slow) + max(tried, count)
+        done, all_starts = len(first) + tried, len(first) + max(tried, count)
         run.report("explore", done, all_starts, _best([c.iterate for c in shown]))
 
     measure(loops)

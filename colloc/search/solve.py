@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from colloc.gaits.gait_fields import AnyGait
 from colloc.gaits.objective import EFFICIENCY
 from colloc.gaits.problem import Problem
 from colloc.gaits.starts import is_visible, on_speed_floor
@@ -66,11 +67,11 @@ def solve(
     begin, run = time.monotonic(), Run(keep, problem, progress)
     try:
         with run.active(seconds):
-            reachable = with_reachable_distance(problem)
+            reachable, known = with_reachable_distance(problem)
             if search == FULL and problem.gait.free:
                 solution = certify_answer(reachable, solve_directly(reachable))
             else:
-                solution = _solve(reachable, starts, check)
+                solution = _solve(reachable, starts, check, known)
             asked = problem.least_distance
             least = {aim.name: least for aim, least in reachable.at_least}.get("distance")
             if asked is not None and least is not None and least < asked:
@@ -91,11 +92,16 @@ def solve(
     return solution
 
 
-def _solve(problem: Problem, starts: int | None, check: Callable[[Iterate], object]) -> Solution:
+def _solve(
+    problem: Problem,
+    starts: int | None,
+    check: Callable[[Iterate], object],
+    known: Sequence[AnyGait],
+) -> Solution:
     explored, failure = None, ""
     if starts != 1 and problem.gait.free:
         try:
-            explored = explore(problem, starts)
+            explored = explore(problem, starts, known)
         except NotConvergedError as error:
             failure = str(error)  # what fails with the guess alone is said in detail
     explored = explored or Exploration([first_optimum(problem, problem.guess)], 1)

@@ -180,7 +180,7 @@ def pareto_front(
         check_count(starts=starts)
     if not 2 <= points <= _MOST_POINTS:
         raise ProblemError(f"a front has 2 to {_MOST_POINTS} points, not {points}.")
-    reachable = with_reachable_distance(problem)
+    reachable, _ = with_reachable_distance(problem)
     stated, intervals, certified = reachable.with_(least_distance=None), points - 1, list[_Point]()
 
     def add(solution):

@@ -276,7 +276,7 @@ def multistart(
     check_choice(SAMPLERS, sampler=sampler)
     if not time_limit > 0:
         raise ProblemError(f"time_limit must be positive, not {time_limit:g}.")
-    problem = with_reachable_distance(_read(problem).problem)
+    problem, _ = with_reachable_distance(_read(problem).problem)
     store = Archive(problem) if archive is None else open_archive(problem, archive)
     done, report = store.done(sampler, seed, starts), reporter(verbose, progress)
     how: dict[str, Any] = {"workers": workers, "time_limit": time_limit, "executor": pool_for}

@@ -194,7 +194,7 @@ def visit(work: Work) -> Visit:
     better than, or the same as, the certified one are passed over. If the best one promises more
     than the search from it keeps, it is tried once more from the problem's own delta_start.
     """
-    problem, attempts = with_reachable_distance(work.problem), list[Attempt]()
+    (problem, _), attempts = with_reachable_distance(work.problem), list[Attempt]()
     met = list[Iterate]()  # at a larger delta
     gaits = {start_key(gait): gait for gait in work.gaits}
     nearest = {key: member(problem, gait) for key, gait in gaits.items()}

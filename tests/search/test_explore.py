@@ -154,6 +154,16 @@ def test_the_search_ends_once_starts_met_the_best_often(
     assert [each.iterate.objective for each in candidates] == [-1.0, -2.0]
 
 
+def test_a_search_goes_on_from_gaits_that_are_known_before_its_starts(monkeypatch):
+    begun = []
+    monkeypatch.setattr(explore, "sketch", lambda coarse, *at: begun.append(at[:2]))
+    monkeypatch.setattr(explore, "small_loops", lambda problem: [])
+    problem = Problem("known", gait=Harmonic(1, "bilateral"))
+    multistart(problem, 1, [GAIT])
+    assert begun[0] == (GAIT, False)
+    assert begun[1] == (problem.guess, True)
+
+
 def test_with_a_little_inertia_one_start_leads_to_what_many_lead_to_in_slow_motion():
     gaits = Problem("same", body=Chain((0.4, 0.2, 0.25, 0.15)), gait=Harmonic(2, "none"))
     inertial, shown = gaits.with_(froude=1e-4), []

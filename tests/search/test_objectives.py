@@ -4,6 +4,7 @@ one expression: the same value, gradient and symbol for all who ask; nothing of 
 
 import pickle
 from dataclasses import replace
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -296,6 +297,9 @@ def test_the_error_of_a_value_is_relative_to_its_magnitude_whatever_its_sign(exp
 
 @pytest.mark.parametrize(("asked", "least"), [(0.3, 0.1), (0.15, 0.15)])
 def test_of_a_distance_that_no_gait_goes_half_of_the_farthest_is_asked(asked, least, monkeypatch):
-    monkeypatch.setattr("colloc.search.explore.farthest_distance", lambda problem: 0.2)
-    stated = with_reachable_distance(Problem("far", least_distance=asked)).at_least
+    farthest = [SimpleNamespace(value=0.2, gait="far"), SimpleNamespace(value=0.1, gait="other")]
+    monkeypatch.setattr("colloc.search.explore.farthest", lambda problem: farthest)
+    problem, known = with_reachable_distance(Problem("far", least_distance=asked))
+    assert known == ["far", "other"]
+    stated = problem.at_least
     assert [(aim.name, level) for aim, level in stated] == [("distance", least)]
