@@ -64,6 +64,8 @@ def test_a_urdf_is_the_chain_that_one_computes_by_hand(tmp_path, capsys):
     robot = problem.robot
     assert (robot.length, robot.mass, robot.period) == pytest.approx((0.32, 0.6, 2.0))
     assert (robot.max_speed, robot.max_torque) == (5.0, (1.5, 1.1))
+    typed = read(tmp_path, WORM, "--period", "2", "--mass", "0.9", "--max-speed", "3").robot
+    assert (typed.mass, typed.max_speed) == (0.9, 3.0)
     said = capsys.readouterr().out
     for words in (
         "j1 = joint_1, j2 = -joint_2",

@@ -54,6 +54,13 @@ def test_verify_finds_a_tampered_gait(three_link, tmp_path, capsys):
     assert "NOT VERIFIED" in capsys.readouterr().out
 
 
+def test_verify_holds_the_interval_of_dry_friction_in_a_file_against_its_own(three_link, tmp_path):
+    for factor, code in ((1.0, 0), (1.01, 4)):
+        dry = tuple(factor * end for end in three_link.dry().efficiency)
+        stated = replace(three_link, certificate=replace(three_link.certificate, dry=dry))
+        assert recheck.verify([str(save(stated, tmp_path / "dry.h5"))]) == code
+
+
 STATED = ("distance", "work", "rotation", "length")
 NUMBERS = [*STATED, "distance_error", "work_error", *checks.NUMBERS, "driven_work"]
 NUMBERS.remove("instants")

@@ -8,6 +8,7 @@ import pytest
 
 import colloc
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, ellipse, replay, solve_balance
+from colloc.bounds.motions import all_motions
 from colloc.mechanics import solution_branches
 from colloc.mechanics.balance import instant, net_force
 from colloc.mechanics.densities import Instants
@@ -230,6 +231,8 @@ def test_the_signs_of_all_motions_add_up_to_one_and_those_that_last_say_what_is_
     found = all_balanced_velocities(body, friction, angles, rates, 1e-4)
     assert found.complete.all()
     assert (found.number > 1).sum() == several
+    of_bound = all_motions(body, friction, angles, rates, 1e-4)[1]
+    np.testing.assert_array_equal(np.bincount(of_bound, minlength=2000), found.number)
     for z, sign in zip(found.z, found.sign, strict=True):
         at = np.flatnonzero(sign)
         now = instant(body, friction, angles[:, at], rates[:, at], z[:, at], 1e-4)

@@ -108,6 +108,7 @@ REFUSED = {
     "one name twice": ("t,q1,q1,q2\n" + table(SECONDS, A, B, C), "two columns are called q1"),
     "head first, or not": ("t,head,middle,tail\n" + table(SECONDS, A, B, C), "head, middle, tail is not clear"),
     "a unit of some": ("t,q1_deg,q2,q3_deg\n" + table(SECONDS, D, E, F), "q2 does not: call it q2_deg or q2_rad"),
+    "radians beside degrees": ("t,q1_deg,q2_rad,q3_deg\n" + table(SECONDS, D, 50 * B, F), r"rad \(q2_rad\)"),
     "no number": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n2,", "\n2,E!", 1), r"line 32, column q1: .* is no number: mend it"),
     "a longer line": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n", ",1\n", 1) + "4,0,0,0\n",
         "line 2, has 5 cells, and the lines below have 4"),
@@ -138,10 +139,12 @@ def test_what_is_no_record_or_several_is_refused_with_a_cure(kind, tmp_path):
     assert "record.csv" in str(refused.value)
 
 
-def test_radians_are_no_degrees_whatever_is_asked_for(tmp_path):
+def test_radians_are_no_degrees_whatever_is_asked_for_and_the_period_is_the_one_asked_for(tmp_path):
     content = "t,joint_1_rad,joint_2_rad,joint_3_rad\n" + table(SECONDS, A, B, C)
     with pytest.raises(colloc.ProblemError, match="joint_1_rad holds radians"):
         read(tmp_path, content, degrees=True)
+    with_period = "# period_s: 4\n" + content.replace("t,", "t_s,", 1)
+    assert read(tmp_path, with_period, period=2.0).period == 2.0  # whatever the file says
 
 
 @pytest.mark.parametrize(

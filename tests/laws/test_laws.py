@@ -74,6 +74,8 @@ def test_a_law_in_other_units_is_the_same_law(law):
     force = np.array(law.density(vs, vn, 1e-2))
     slower = law.in_speeds_of(4.0).density(vs / 4, vn / 4, 1e-2 / 4)
     np.testing.assert_allclose(slower, force, rtol=1e-13)
+    slopes = law.in_speeds_of(4.0).density_jacobian(vs / 4, vn / 4, 1e-2 / 4)
+    np.testing.assert_allclose(slopes, 4 * np.array(law.density_jacobian(vs, vn, 1e-2)), rtol=1e-9)
     np.testing.assert_allclose(law.in_units_of(3.0).density(vs, vn, 1e-2), force / 3, rtol=1e-13)
     if law.degree is not None:
         faster = law.density(2 * vs, 2 * vn, 2e-2)

@@ -71,6 +71,7 @@ def test_another_result_stands_beside_it_and_both_films_are_seen_whole_at_one_sc
     page = report_page(three_link, beside=other)
     text = " ".join(outline(page).text)
     assert "Beside three_link_offset" in text
+    assert "10 % less with 10 % more" in text
     assert "Different: efficiencies differ by 20" in text
     assert "987.0" in text
     films = re.findall(r'<svg width="(\d+)" height="(\d+)".* aria-label="(\w+) as it moves', page)

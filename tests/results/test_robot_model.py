@@ -158,6 +158,13 @@ def test_a_file_moves_in_mujoco_as_it_is_as_colloc_says(body, mu_t, gait, unsolv
     assert direction_of_travel(centre, tail) == solution.robot(**size).facts["travels"]
 
 
+def test_a_model_of_a_slow_robot_takes_short_steps_too(three_link, tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    three_link.export(tmp_path / "x.xml", period=20.5, length=0.5, mass=1.0)
+    step = mujoco.MjModel.from_xml_path(str(tmp_path / "x.xml")).opt.timestep
+    assert step == pytest.approx(20.5 / np.ceil(20.5 / 1e-3))
+
+
 @pytest.mark.slow
 def test_a_coasting_robot_comes_in_mujoco_to_the_speed_that_colloc_says(unsolved, tmp_path):
     """README's robot and about its best gait, which takes many cycles to build up its speed."""

@@ -301,6 +301,7 @@ def test_a_gait_that_turns_goes_as_far_as_its_mirror_image_which_turns_the_other
     assert other.success
     assert other.rotation == pytest.approx(-one.rotation, rel=1e-6)
     assert abs(one.rotation) > 0.3
+    assert one.answer.distance == pytest.approx(one.certificate.distance, rel=1e-3)
     little = colloc.evaluate(QUICK, colloc.Fourier([0.2003, -0.2], [[0.9], [-0.9]], [[0.5]] * 2))
     assert little.success  # as one that turns, by 1e-3 of its way
     assert 0 < abs(little.problem.rotation) < 1e-4

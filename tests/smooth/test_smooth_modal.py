@@ -13,7 +13,7 @@ from colloc.results.comparison import distance, reversed_in_time, swap_ends
 from colloc.search.iterate import evaluate_at, space_near
 from colloc.search.optimise import on_more_panels
 from colloc.search.solve import solve
-from colloc.smooth.balance import Motion
+from colloc.smooth.balance import Motion, PanelBatch
 from colloc.transcription.shape_constraints import shape_checks
 from scripts.models.period import measured_period
 from tests.shared.stages import answer_near, program_of
@@ -170,6 +170,14 @@ def test_panels_stay_where_they_do_not_matter():
     # and a chain has none to add
     stated = Problem("chain", gait=Harmonic(1, "antipodal"))
     assert on_more_panels(evaluate_at(*space_near(stated, stated.guess), 0.1)) is None
+
+
+def test_joints_work_by_their_bending_moment_and_not_by_what_friction_takes(monkeypatch):
+    of_moments = PanelBatch.bending_power
+    monkeypatch.setattr(PanelBatch, "bending_power", lambda *at: 1.01 * of_moments(*at))
+    at = ModalBody(2, panels=4), Friction(), GAIT, 0.1
+    again = replay(*at, instants=80, tolerance=1e-3)
+    assert again.actuator_work / again.work == pytest.approx(1.01, abs=1e-3)
 
 
 @pytest.mark.slow

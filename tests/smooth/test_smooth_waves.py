@@ -144,6 +144,8 @@ BODY = CrawlerBody(0.05, panels=16)
 def test_the_paper_s_crawler_is_one_of_them():
     crawler, corners = Concertina(epsilon=0.05, amplitude=1.3), BODY.concertina(1.3, sides=6)
     s = np.linspace(0.4, 0.6, 201)[:, None] * np.ones((1, 3))
+    # no corner of nine lies on the way back
+    np.testing.assert_allclose(BODY.concertina(1.3, sides=9)[:, -2:], corners[:, -2:])
     phases = np.array([1 / 12, 1 / 6, 1 / 3])  # half grown, grown, at the front
     shown = np.array([[p, 0.0, a, 0.0, 0.0] for p, a in ((LAP, 0.65), (LAP, 1.3), (0.0, 1.3))]).T
     assert {tuple(shape) for shape in shown.T} <= {tuple(vertex) for vertex in corners.T}

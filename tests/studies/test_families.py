@@ -17,7 +17,9 @@ from colloc.gaits.fitted_gait import fitted_gait
 from colloc.pictures.figure import plot_front, plot_steering
 from colloc.results.robot import in_si
 from colloc.search.solve import solve
+from colloc.studies import families
 from colloc.studies.families import Gap, ParetoFront, Steering
+from colloc.system.errors import NotConvergedError
 
 USUAL = {"gait": Harmonic(1, "bilateral"), "mesh_tolerance": 1e-4}
 PROBLEM = Problem("wide", friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=1e-2, **USUAL)
@@ -60,6 +62,19 @@ def test_points_differ_and_what_lies_empty_is_listed():
     assert shares.min() > 0.02
     (empty,) = np.flatnonzero(shares > 0.5)
     assert [gap.after for gap in front.gaps] == [empty]
+
+
+def test_a_gap_says_why_its_gait_failed(monkeypatch):
+    def fail_between(problem, starts):
+        if len(problem.at_least) > len(LONG.at_least):
+            raise NotConvergedError("nobody knows")
+        return alone(problem, starts)
+
+    alone = families.solve_member
+    monkeypatch.setattr(families, "solve_member", fail_between)
+    front = pareto_front(LONG, "speed", "efficiency", points=4, starts=1)
+    assert [gap.why for gap in front.gaps] == ["nobody knows"]
+    assert not front.certified
 
 
 def test_the_figure_draws_no_line_over_a_gap(front):
