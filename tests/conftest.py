@@ -74,8 +74,7 @@ def three_link(solved):
 
 @pytest.fixture(scope="session")
 def unsolved():
-    """A function from a problem to a solution whose one level is the guess, in balance but not
-    optimal."""
+    """A function from a problem to a solution that is its guess, in balance but not optimal."""
     return guess_in_balance
 
 

@@ -310,8 +310,7 @@ def test_what_a_problem_file_and_its_parts_print_does_not_spoil_the_one_object(s
 
 
 def shell(line, folder):
-    """A line of a shell with colloc as a function; its exit code (of the first of a pipe), output
-    and errors."""
+    """Exit code (of the first of a pipe), output and errors of a line with colloc as a function."""
     program = f'colloc() {{ "{sys.executable}" -m colloc "$@"; }}; set -o pipefail; {line}'
     words = ["bash", "-c", program]
     done = subprocess.run(words, capture_output=True, text=True, cwd=folder)
@@ -340,8 +339,7 @@ def test_a_pipe_that_is_closed_early_is_one_sentence_and_a_code_of_its_own(resul
 
 @pytest.mark.slow
 def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_path):
-    """An installation without a compiler has no extension module; other sources, so that what is
-    installed beside is not taken for it."""
+    """No compiler, so no extension module; other sources, so that no installed one is taken."""
     library, kernel = Path(gait_fields.__file__).parents[1], shutil.ignore_patterns("_kernel.*")
     copied = shutil.copytree(library, tmp_path / "colloc", ignore=kernel)
     (copied / "mechanics" / "native" / "parts.h").write_text("/* another */")

@@ -1,5 +1,4 @@
-"""A robot can use it: whatever the pacing, the exported samples do what the result does, within the
-joint speed limits."""
+"""Whatever the pacing, exported samples do what the result does, within joint speed limits."""
 
 import json
 

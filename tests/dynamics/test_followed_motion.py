@@ -47,8 +47,7 @@ def step_by_step(path, n=2500):
 
 
 def test_the_part_of_the_period_with_several_motions_is_that_of_its_instants():
-    """Panels count as at the worse of their ends, so a little more. A rotation moves all of the
-    way."""
+    """Panels count as at their worse ends, so a little more. A rotation moves all of the way."""
     path, t = random_path(3), (np.arange(2000) + 0.5) / 2000
     several = (all_balanced_velocities(BODY, STEEP, *path(t), 1e-4).number > 1).mean()
     found = replay(BODY, STEEP, path, 1e-4, instants=1600, most_instants=1600)

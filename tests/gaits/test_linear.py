@@ -1,5 +1,4 @@
-"""Fourier series, serpenoid gaits, B-splines and columns of one's own: against each other and
-differences."""
+"""Fourier series, serpenoid gaits, B-splines, given columns: against each other and differences."""
 
 import numpy as np
 import pytest

@@ -157,8 +157,7 @@ def from_start(start, friction, symmetry, **fields):
 
 
 def test_an_optimum_that_rounds_the_corner_of_the_contact_region_is_certified():
-    """The fourth maximum of the paper's sweep, 0.1240. Constrained at fixed instants it ended 6e-3
-    rad inside the region."""
+    """The fourth maximum of the paper's sweep, 0.1240; fixed instants ended 6e-3 rad inside."""
     solution = solve(from_start(2, Friction(), "antipodal", intervals=20), 1)
     assert solution.status == "solved", solution.message
     assert solution.certificate.efficiency == pytest.approx(0.1240, abs=1e-4)

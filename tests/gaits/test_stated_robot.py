@@ -88,8 +88,7 @@ def slow_robot(once):
 
 
 def whoever_speaks_of_it_says_the_same(found, tmp_path):
-    """How fast a robot is and what it draws: its sheet has the torques of all instants, and an
-    export is of the same robot."""
+    """How fast a robot is and what it draws, by its sheet and by an export of the same robot."""
     facts, sheet, robot = in_si(found), found.robot().facts, found.problem.robot
     for name, same in (
         ("speed_m_per_s", "speed_m_per_s"),

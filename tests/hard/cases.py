@@ -1,5 +1,4 @@
-"""Shapes and rates that are hard for a balance solver, as one table: name, joint angles, joint
-rates."""
+"""Shapes and rates that are hard for a balance solver: names, joint angles and joint rates."""
 
 import numpy as np
 

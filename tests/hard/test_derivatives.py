@@ -37,8 +37,7 @@ def derivative(function, x, step):
 
 
 def check(function, x, given, delta, step, solved=None, tolerance=1e-6):
-    """Jacobian and Hessian of a `LocalFunction` at x and given numbers; `solved` gives what it is
-    solved for."""
+    """Jacobian and Hessian of a `LocalFunction` at x; `solved` gives what it is solved for."""
     value, slope, curvature, on_slope, on_curvature = function.functions
 
     def jacobian(*at):
@@ -105,8 +104,7 @@ def test_point_function_at_hard_points(formulation, names):
 
 @pytest.mark.parametrize("formulation", ["implicit velocity", "full"])
 def test_point_function_where_nothing_moves(formulation):
-    """Frozen joints, everything at rest: friction is linear there, with a finite slope mu /
-    delta."""
+    """Joints frozen, everything at rest: friction is linear, with a finite slope mu / delta."""
     friction, delta = Friction(mu_t=3, mu_f=1, mu_b=1), 1e-2
     at = THREE, friction, (0.7, -0.4), (0.0, 0.0), delta, formulation
     check_point(*at, step=1e-2 * delta, tolerance=1e-5)

@@ -83,8 +83,7 @@ def test_the_answer_does_not_depend_on_a_start_1e6_away(coefficients):
 
 
 def test_rates_below_delta_are_solved_to_their_own_scale():
-    """Viscous limit: the velocity is linear in the rates, whatever their size, and does not depend
-    on delta."""
+    """Viscous limit: the velocity is linear in rates of any size and independent of delta."""
     angles, rates = ANGLES[:, 7:12], np.array([[1.0], [0.3]]) * np.ones((1, 5))
     for coefficients in COEFFICIENTS[:7]:
         friction = coulomb(*coefficients)
@@ -124,8 +123,7 @@ def test_scissors_share_their_rate_equally(delta):
 
 
 def test_two_links_that_nearly_rest_beside_one_that_turns_are_followed_from_smoother_friction():
-    """Every attempt at delta itself stopped at residuals of 7e-5 and above; at twice delta all is
-    well."""
+    """Attempts at delta itself stop at residuals of 7e-5 and above; at twice delta all is well."""
     angles = np.array([[2.41881], [-2.41881]])
     rates = np.array([[1.0], [-1.5312e-4]])
     solved = solve_balance(BODY, Friction(mu_t=10.0, mu_f=1.0, mu_b=1.7), angles, rates, 1e-6)
@@ -142,8 +140,7 @@ needs_kernel = pytest.mark.skipif(native_kernel() is None, reason="no C compiler
 )
 @pytest.mark.parametrize("coefficients", COEFFICIENTS, ids=str)
 def test_every_hard_instant_moves_as_numpy_says(coefficients, delta):
-    """A residual leaves the velocity uncertain by max(mu)/min(mu) times as much, so a small one is
-    asked for."""
+    """A residual leaves max(mu)/min(mu) times as much of the velocity open: it has to be small."""
     at = BODY, coulomb(*coefficients), ANGLES, RATES, delta
     compiled = solve_balance(*at, tolerance=1e-13)
     with numpy_instead():
@@ -155,8 +152,7 @@ def test_every_hard_instant_moves_as_numpy_says(coefficients, delta):
 @pytest.mark.parametrize("delta", [1e-3, 1e-7])
 @pytest.mark.parametrize("lengths", [(1 / 3,) * 3, (0.3, 0.2, 0.15, 0.35)], ids=len)
 def test_bodies_under_load_are_in_the_state_that_they_state(lengths, delta):
-    """Force, potential and power at the velocity found, by NumPy; in balance with every load that
-    friction holds."""
+    """Force, potential and power by NumPy; in balance with every load that friction holds."""
     rng, body, n = np.random.default_rng(6), Chain(lengths), 400
     angles, rates = rng.uniform(-3, 3, (body.n_joint, n)), rng.uniform(-1, 1, (body.n_joint, n))
     load = rng.normal(size=(3, n)) * [[0.4], [0.4], [0.1]]

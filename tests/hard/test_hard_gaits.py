@@ -1,5 +1,4 @@
-"""Gaits of vanishing amplitude, gaits that touch themselves, meshes too coarse for delta:
-certified, or refused in words."""
+"""Tiny gaits, self-contact, meshes too coarse for delta: certified, or refused in words."""
 
 import numpy as np
 import pytest
@@ -22,8 +21,7 @@ def replayed(gait, delta, **settings):
 
 
 def test_small_gaits_scale_down_to_amplitude_1e_8():
-    """About a shape, distance falls with the square of the amplitude and work with the amplitude
-    itself."""
+    """About a shape, distance falls with the amplitude squared, work with the amplitude."""
     sizes = np.array([1e-3, 1e-4, 1e-6, 1e-8])
     runs = [replayed(ellipse(1.0, a, 0.7 * a), 1e-4 * a) for a in sizes]
     np.testing.assert_allclose(
@@ -36,8 +34,7 @@ def test_small_gaits_scale_down_to_amplitude_1e_8():
 
 
 def test_gaits_slower_than_delta_are_viscous_and_go_nowhere():
-    """Linear drag, equal in all directions: its sum is the velocity of the centre of mass, which
-    therefore rests."""
+    """Linear drag, alike in all directions, sums to the centre of mass' velocity, which is 0."""
     runs = [
         replayed(ellipse(1.0, a, 0.7 * a), 1e-4, instants=200, most_instants=200)
         for a in (1e-6, 1e-7, 1e-8)
@@ -52,8 +49,7 @@ def test_gaits_slower_than_delta_are_viscous_and_go_nowhere():
 
 @pytest.mark.parametrize(("intervals", "delta"), [(2, 1e-4), (3, 1e-6), (5, 1e-8), (10, 1e-10)])
 def test_a_mesh_that_does_not_resolve_delta_fails_its_certificate(intervals, delta):
-    """The replay knows better than the mesh: a wrong efficiency is never called solved, and the
-    message says why."""
+    """By the replay a wrong efficiency is never called solved, and the message says why."""
     at = {"intervals": intervals, "delta": delta, "mesh_tolerance": 0}
     problem = Problem("coarse", ellipse(0.0, 2.8, 1.3), gait=BILATERAL, **at)
     solution = solve(problem, 1)

@@ -1,5 +1,4 @@
-"""Properties that hold for every body, friction, shape and rate, tried on cases that hypothesis
-looks for (derandomised)."""
+"""What holds for every body, friction, shape and rate, on derandomised cases of hypothesis."""
 
 import numpy as np
 from hypothesis import assume, given, settings
@@ -70,8 +69,7 @@ def test_a_link_cut_by_a_frozen_joint_moves_as_before(case, law, exponent):
 @tried
 @given(instants(), friction, log_delta)
 def test_dissipation_is_at_least_the_smallest_coefficient_times_the_speed(case, law, exponent):
-    """v^2/r >= |v| - delta at every point, and the mean of |v| is at least the speed of the centre
-    of mass."""
+    """v^2/r >= |v| - delta at every point; the mean |v| is at least the centre of mass' speed."""
     body, angles, rates = case
     delta = 10.0**exponent
     z = solved(body, law, angles, rates, delta)

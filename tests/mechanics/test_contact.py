@@ -94,8 +94,7 @@ def test_the_tangent_planes_of_the_minimum_lie_above_it_and_touch():
 
 
 def corner_peak(gait):
-    """The checks, which of them is at the corner, and the instant and height of its peak, on 40
-    intervals."""
+    """The checks, the one at the corner, and instant and height of its peak, on 40 intervals."""
     problem = Problem(name="corner", guess=AROUND_THE_CORNER)
     checks = shape_checks(problem.body)
     mesh = control_problem(problem).mesh()

@@ -239,8 +239,7 @@ def test_a_wheel_says_which_of_the_two_laws_it_has():
 
 @pytest.mark.parametrize("wheel", [{"rolling": 1e-7}, {"rolling": 1.0, "sideways": 1e7}], ids=str)
 def test_wheels_that_roll_freely_or_hold_firmly_do_not_slip(wheel):
-    """To rolling over sideways friction times delta, and not times the speed: it is nonholonomic at
-    any small ratio."""
+    """To rolling over sideways friction times delta, not speed: nonholonomic at small ratios."""
     body = on_axles(**wheel)
     z = colloc.solve_balance(body, Friction(), *BENT, 1e-3).require().z
     known = [
@@ -283,8 +282,7 @@ def test_three_links_on_a_foot_each_go_three_times_as_far_for_their_work_as_on_a
 
 
 def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says():
-    """Wheels alone: the problem's friction acts nowhere. The search sees it in units of its own
-    size."""
+    """Wheels alone: the problem's friction acts nowhere; the search's unit is their friction."""
     wheels = Chain(feet=tuple(Wheel(link, rolling=0.02, sideways=1.0) for link in range(3)))
     laws = Friction(), colloc.Elliptic(mu_t=7, mu_f=8, mu_b=9)
     one, other = (Problem("wheels", body=wheels, friction=own) for own in laws)
@@ -327,8 +325,7 @@ def test_the_way_from_the_centre_of_mass_is_largest_where_all_links_pull_one_way
 
 
 def test_a_gait_of_no_size_pays_no_more_than_the_least_friction_on_one_foot_a_link_only():
-    """Two feet hold while the third is swung: 1/min(mu), which no gait exceeds. More feet to a link
-    are dragged along."""
+    """Two feet hold, the third swings: 1/min(mu), which no gait exceeds; more feet are dragged."""
     folded, straight = np.array([2.5, -2.5]), np.zeros(2)
     assert 1 - 1e-4 < small_gait(Chain(feet=1), Friction(), folded).efficiency <= 1
     assert 1 - 1e-3 < small_gait(Chain(feet=1), Friction(), straight).efficiency <= 1
@@ -345,8 +342,7 @@ def test_what_feet_cannot_do_yet_is_refused():
 
 
 def test_the_summary_says_for_how_much_of_the_period_each_foot_holds(on_feet, three_link, unsolved):
-    """The outer feet hold in turns, for a good part of the period each; a body that lies has
-    none."""
+    """Outer feet hold in turns, for a good part of the period each; lying bodies have none."""
     shares = on_feet.share_held
     np.testing.assert_allclose(shares, frames(on_feet, 1001).holding[:, :-1].mean(1), atol=3e-3)
     assert 0.25 < shares[[0, 2]].min() < shares[[0, 2]].max() < 0.5

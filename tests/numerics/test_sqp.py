@@ -1,5 +1,4 @@
-"""SQP with quasi-Newton updates: known optima, constraints that contradict each other at first,
-kinks, boxes."""
+"""SQP with quasi-Newton updates: known optima, constraints that clash at first, kinks, boxes."""
 
 from __future__ import annotations
 
@@ -23,8 +22,7 @@ class Program:
 
 
 def hock_schittkowski_71():
-    """min x1 x4 (x1 + x2 + x3) + x3 with x1 x2 x3 x4 >= 25, |x|^2 = 40, 1 <= x <= 5; optimum
-    17.0140173."""
+    """min x1 x4 (x1 + x2 + x3) + x3 = 17.0140173: prod x >= 25, |x|^2 = 40, 1 <= x <= 5."""
     return Program(
         lambda x: x[0] * x[3] * x[:3].sum() + x[2],
         lambda x: np.array([x[3] * (2 * x[0] + x[1] + x[2]), x[0] * x[3], x[0] * x[3] + 1,
@@ -116,8 +114,7 @@ def test_only_the_box_has_an_edge_the_bounds_of_a_program_have_none(least_at, bo
 
 
 def test_multipliers_and_violations_are_those_of_bounds_by_hand():
-    """3 x - 2 y within a square is least in its corner (0, 1); a row that does not bind has no
-    multiplier."""
+    """In a square 3 x - 2 y is least in the corner (0, 1); slack rows have no multipliers."""
     slopes = np.array([3.0, -2.0])
     rows = lambda x: x[:1] + x[1:], lambda x: np.ones((1, 2)), [-5], [5]
     program = Program(lambda x: slopes @ x, lambda x: slopes, *rows, 2, 0, 1)
@@ -218,8 +215,7 @@ def test_gradients_of_all_sides_cancel_at_the_bottom_of_a_valley(slopes):
 
 
 def test_a_narrow_side_is_found_that_chance_misses():
-    """Of the plane the third piece has a fiftieth, right below; the others' gradients leave (0,
-    0.05)."""
+    """The third piece has a fiftieth of the plane, below; others' gradients leave (0, 0.05)."""
     narrow = Pieces([(1, 0.05), (-1, 0.05), (0, -0.01)])
     assert around(narrow, ZERO, points=2).kkt_error < 2e-6
     wide = Pieces([(1, 0.05), (-1, 0.05)])
@@ -276,8 +272,7 @@ def test_a_kink_farther_away_than_the_radius_does_not_count():
 
 @pytest.mark.parametrize("seed", range(40))
 def test_nonnegative_least_squares_meet_the_conditions_of_a_minimum(seed):
-    """Which are sufficient, as the program is convex; up to what rounding leaves of the sums that
-    slopes are."""
+    """Sufficient ones, as the program is convex; up to rounding of the sums that slopes are."""
     rng = np.random.default_rng(seed)
     matrix, right = rng.standard_normal(rng.integers(1, 9, 2)), rng.standard_normal(9)
     if seed % 2:  # an equation is a column and its reverse

@@ -71,8 +71,7 @@ def test_a_gait_beside_itself_is_drawn_twice_alike(three_link, tmp_path, capsys)
 
 
 def test_robots_side_by_side_are_drawn_in_metres_and_seconds():
-    """One of half the length and a quarter of the period, at so slow a pace that both do the
-    same."""
+    """One of half the length and a quarter of the period; slow, so both do the same."""
     robots = (colloc.Robot(length=x, mass=1, period=t) for x, t in ((0.6, 400), (0.3, 100)))
     stated = (colloc.Problem("robot", gait=colloc.Harmonic(1), robot=robot) for robot in robots)
     big, small = (colloc.evaluate(each, colloc.ellipse(A0=0, A1=1.5, B1=1.0)) for each in stated)

@@ -136,8 +136,7 @@ def film(name, beside=None):
 
 @also
 def page(name, lines=None, beside=None):
-    """Words of the report, or so many lines of them, but for the drawings; of a front, too, with
-    another result beside it."""
+    """Words (or lines) of the report without drawings; of a front with a result beside it."""
     more = {"front": front_of(name, beside), "beside": state(beside)} if beside else {}
     more |= {"robot": state(name).robot()} if beside else {}
     text = words_of(report_page(state(name), PAPER, "  upper bound 1", **more))

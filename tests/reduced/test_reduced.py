@@ -1,5 +1,4 @@
-"""The reduced space: exact gradients, the same numbers as the full program, and answers that solve
-the full program."""
+"""The reduced space: exact gradients, the full program's numbers, and answers that solve it."""
 
 import numpy as np
 import pytest

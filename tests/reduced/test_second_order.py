@@ -87,8 +87,7 @@ def test_a_bend_that_a_longer_step_does_not_see_is_no_saddle_and_an_error_is_wha
 
 
 def test_the_peak_of_a_moment_moves_with_the_gait():
-    """The second derivative of the largest moment over time is that at its instant and what the
-    move of the instant adds."""
+    """Second derivatives of the largest moment over time: at its instant, and of its move."""
     gait, asked = Harmonic(1, "bilateral"), {"torque_limit": 0.06, "delta": 1e-2}
     problem = Problem("weak", body=Chain((0.25,) * 4), gait=gait, **asked)
     space, v = space_near(problem, problem.guess)
@@ -153,8 +152,7 @@ def test_an_optimum_is_better_than_its_neighbours():
 
 @pytest.mark.parametrize("follows", [True, False])
 def test_a_gait_comes_to_rest_at_limits_that_it_touches_for_an_instant(follows, monkeypatch):
-    """With the instants held it swings: every round is optimal for the instants of the one
-    before."""
+    """With fixed instants it swings: every round is optimal for those of the one before."""
     if not follows:
         monkeypatch.setattr(ReducedProgram, "follow_worst", lambda held: None)
     monkeypatch.setattr(converge, "OPTIONS", replace(OPTIONS, radius=0.5))
@@ -178,8 +176,7 @@ def found():
 
 @pytest.mark.parametrize(("beyond", "kept"), [(0.0, False), (1e-7, False), (1e-4, True)])
 def test_what_ipopt_finds_is_the_answer_where_its_checks_rest(found, monkeypatch, beyond, kept):
-    """Up to what a certificate lets pass; else the gait of the search is, if it satisfies the
-    first-order conditions."""
+    """Up to what certificates let pass; else the search's gait, if first-order optimal, is."""
     place = ReducedProgram.place_rows
     monkeypatch.setattr(ReducedProgram, "place_rows", lambda at, v: (place(at, v), beyond)[1])
     answer = confirm(found)
@@ -202,8 +199,7 @@ def test_a_solve_that_begins_at_its_answer_stays_there_at_one_delta(changed):
 
 @pytest.fixture(scope="module")
 def saddle():
-    """Without an offset the gait is its own mirror image, and the gradient has no part that would
-    give it one."""
+    """Without an offset the gait is its own mirror image, and no gradient would give it one."""
     space, v = space_near(PLAIN, SADDLE)
     v = root(ReducedProgram(space, PLAIN.delta).gradient, v, tol=1e-9).x
     return evaluate_at(space, v, PLAIN.delta)

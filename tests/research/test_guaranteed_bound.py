@@ -1,5 +1,4 @@
-"""The guaranteed bound: its certificates hold at every motion inside a cell, and its inequalities
-are what they claim."""
+"""The guaranteed bound: certificates hold at every motion in a cell; the inequalities are true."""
 
 import json
 from pathlib import Path
@@ -46,8 +45,7 @@ def all_cells(low, sizes):
 
 
 def random_cells(body, friction, size, seed, thin=False, count=8):
-    """Cells for any body, motions at their corners and a reference point that has nothing to do
-    with a potential."""
+    """Cells of any body, motions at their corners, a reference point unrelated to potentials."""
     rng = np.random.default_rng(seed)
     low, sizes = (
         rng.uniform(-1, 1, (3, count)) * [[2.5], [2.5], [0.9]],
@@ -65,8 +63,7 @@ def random_cells(body, friction, size, seed, thin=False, count=8):
 
 
 def boxes(potential, size, count, seed, thin=False):
-    """Random cells that no knot cuts; near the plane s = 0, where one joint turns alone, if
-    thin."""
+    """Random cells that no knot cuts; if thin, near s = 0, where one joint turns alone."""
     rng, knots = np.random.default_rng(seed), potential.spline.knots
     least, most = np.array([[0, -np.pi, -1], [np.pi - size, np.pi - size, 1 - size]])[..., None]
     low = rng.uniform(least, most, (3, count))
@@ -79,8 +76,7 @@ def boxes(potential, size, count, seed, thin=False):
 
 
 def motions_inside(cells, count, seed, body=BODY, friction=UNIT):
-    """Share of the corners ``(n, count, 8)`` at random points of the cells, and the balanced
-    motions there."""
+    """Share of corners ``(n, count, 8)`` at random points of cells; balanced motions there."""
     shares = np.random.default_rng(seed).uniform(0, 1, (3, cells.low.shape[1], count))
     weights = np.prod(
         np.where(
@@ -97,8 +93,7 @@ def motions_inside(cells, count, seed, body=BODY, friction=UNIT):
 
 @pytest.mark.slow
 def test_loaded_forces_bound_the_power_from_below():
-    """Weak duality: admissible forces in balance with a load prove J(z) >= beta.r + load.z for
-    every motion z."""
+    """Weak duality: admissible forces in balance with a load prove J(z) >= beta.r + load.z."""
     rng = np.random.default_rng(32)
     n = 100
     q, r = rng.uniform(-3, 3, (2, n)), np.stack([np.ones(n), rng.uniform(-1, 1, n)])

@@ -59,8 +59,7 @@ def test_operations_hold_the_exact_results_of_all_that_their_operands_hold(tmp_p
 
 
 def exact_state(lengths, sigma, point, z, load):
-    """Dissipation, forces (along, across, moment about the hinge) of each link, sum phi . B r,
-    force and torque left over."""
+    """Dissipation, forces of links (along, across, about the hinge), sum phi . B r, imbalance."""
     mp, total, forces, left = mpmath.mpf, mpmath.mpf(0), [], [mpmath.mpf(float(x)) for x in load]
     *q, s = (mp(float(x)) for x in point)
     z, side = [mp(float(x)) for x in z], mp(float(lengths[1])) / 2
@@ -87,8 +86,7 @@ def exact_state(lengths, sigma, point, z, load):
     "friction", [Friction(), Elliptic(mu_t=1.0, mu_f=0.6, mu_b=1.4)], ids=["equal", "directed"]
 )
 def test_what_is_stated_of_a_corner_holds_what_it_is_to_sixty_digits(friction):
-    """Of motions of any speed; of links that hardly turn, and of ones that turn about a point of
-    their own."""
+    """At any speed; with links that hardly turn, or turn about a point of their own."""
     rng, body, n = np.random.default_rng(72), Chain((0.3, 0.45, 0.25)), 60
     points = rng.uniform(-2.5, 2.5, (3, n)) * [[1], [1], [0.4]]
     z = rng.normal(size=(3, n)) * 10.0 ** rng.integers(-9, 1, n)
@@ -121,8 +119,7 @@ extern "C" void piece(const double *mean, double begin, double end, Interval *fo
 
 
 def test_growth_of_a_short_arc_is_never_more_than_it_is_and_nearly_as_much(tmp_path):
-    """The integral of (a.n)^2/|V| by quadrature, of changes that turn about a point of the piece
-    too."""
+    """The integral of (a.n)^2/|V| by quadrature, also for turns about a point of the piece."""
     (tmp_path / "piece.cpp").write_text(PIECE)
     headers = {each.name: each.read_text("ascii") for each in kernel.SOURCES.glob("*.hpp")}
     library = compiled_library(tmp_path / "piece.cpp", kernel.proof_flags(), headers)

@@ -282,8 +282,7 @@ CASES = cases(CASES, globals())
 
 @pytest.mark.parametrize("case", slow_but(["harmonics", "serpenoid"], CASES))
 def test_the_fastest_instants_are_as_fast_as_allowed(case):
-    """Also between the points of the mesh, of any class paced by time, and of motions with
-    states."""
+    """Between mesh points too, for any class paced by time, and for motions with states."""
     found = colloc.solve(Problem("limited", **CASES[case]), starts=1)
     assert found.status == "solved"
     fastest = np.abs(found.gait.rates(T)).max(axis=1)
@@ -357,8 +356,7 @@ LYING, FRICTION = Chain(), Friction()
 
 
 def efficiencies(A, n):
-    """d/W of ellipses, one per row (A0, A1, B1), by the midpoint rule on the whole period; 0 where
-    inadmissible."""
+    """d/W of ellipses in rows (A0, A1, B1), by the midpoint rule; 0 where inadmissible."""
     t = (np.arange(n) + 0.5) / n
     c, s = np.cos(2 * np.pi * t), np.sin(2 * np.pi * t)
     A0, A1, B1 = (A[:, k, None] for k in range(3))
@@ -379,8 +377,7 @@ def efficiencies(A, n):
 
 
 def swept_maximum(centre, width, n=120):
-    """Maximum over grids that shrink around their best point until they are 1e-3 wide; (value,
-    point)."""
+    """Value and point, over grids that shrink around their best point to a width of 1e-3."""
     centre = np.array(centre)
     while width > 2e-3:
         axis = np.linspace(-width, width, 7)

@@ -75,8 +75,7 @@ def test_where_gaits_shrink_the_search_goes_on_among_those_that_a_person_sees_mo
 @pytest.mark.slow
 @pytest.mark.parametrize(("feet", "least"), [(1, 1.666), (0, 1.192)], ids=["feet", "lying"])
 def test_four_links_whose_twitch_is_best_get_a_gait_that_one_sees_as_good_as_known(feet, least):
-    """On feet the best bilateral gait, which the class contains, has 1.666; lying the fastest for
-    its path has 1.192."""
+    """On feet the class' best bilateral gait has 1.666; lying, the fastest for its path 1.192."""
     friction = Friction(0.3, 0.3, 0.3)
     body = Chain(FOUR, feet=feet)
     solution = solve(Problem("robot", None, body, friction, Harmonic(2), **WITHIN))
@@ -226,8 +225,7 @@ def test_gaits_are_solved_for_until_one_holds_and_none_promises_more(
 
 
 def test_where_no_certificate_holds_the_best_of_gaits_that_were_left_is_the_answer(monkeypatch):
-    """The first three of all followed fail; what comes of others is another gait, at the final
-    delta."""
+    """The first three followed fail; what comes of others is another gait, at the final delta."""
     problem, asked = Problem("quick", gait=Harmonic(1, "bilateral"), delta=1e-2), []
     finish = stages.finish
     explored = explore.explore(problem, 6)
@@ -254,8 +252,7 @@ def test_where_no_certificate_holds_the_best_of_gaits_that_were_left_is_the_answ
 
 @pytest.mark.slow
 def test_a_gait_that_jumps_between_balanced_motions_gives_way_to_one_that_certifies():
-    """Three links on a foot between two wheels: most of what promises well turns in jumps, whose
-    phase no mesh decides."""
+    """A foot between wheels: most that promises well turns in jumps whose phase no mesh decides."""
     wheels = [
         Wheel(link, place, rolling=0.056, weight=0.2872234)
         for link, place in ((0, 0.24857), (2, 0.75143))

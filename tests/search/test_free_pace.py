@@ -57,8 +57,7 @@ def test_the_best_pace_is_that_of_the_best_fixed_one():
 
 
 def test_inertia_alone_decides_the_pace_of_the_efficiency_where_sideways_friction_is_small():
-    """Slower and faster the same gait does less for its work; so nothing has to say what time is
-    worth."""
+    """Slower and faster the same gait does less for its work; so time needs no price."""
     law, free = colloc.Friction(mu_t=0.1), {"gait": colloc.Harmonic(1), "rotation": None}
     stated = problem(colloc.Free(0.02, 3.0), objective="efficiency", guess=SKATING, friction=law)
     found = best(stated.with_(intervals=20, **free))

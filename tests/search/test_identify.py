@@ -1,5 +1,4 @@
-"""Friction from motion: what moved under known coefficients is found to, within the stated errors;
-what a motion does not tell is said."""
+"""Friction from motion, within the stated errors; what a motion does not tell is said."""
 
 import json
 from types import SimpleNamespace
@@ -27,8 +26,7 @@ def crawled():
 def recorded(
     path, solution, seed=0, noise=2e-3, periods=2.0, per_period=100, point="", length=1.0, lasts=1
 ):
-    """A record of joint angles and of places of a point, from a camera that stands somewhere, whose
-    noise lasts for so many samples."""
+    """Joint angles and places of a point, by a camera anywhere; noise lasts for so many samples."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(periods * per_period)) / per_period
     motion = solution.sample(t)
@@ -200,8 +198,7 @@ def test_a_slow_body_on_axles_that_tells_nothing_says_so(tmp_path):
 
 @pytest.mark.slow
 def test_what_the_motion_does_not_tell_stays_as_stated_and_is_said(tmp_path):
-    """A body that is driven tail first, on feet that hardly slip sideways, tells nothing of sliding
-    forwards."""
+    """Driven tail first, on feet that hardly slip sideways, it says nothing of sliding forwards."""
 
     def standing(back):
         each = Friction(mu_t=1.0, mu_f=0.1, mu_b=back)

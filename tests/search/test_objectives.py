@@ -101,8 +101,7 @@ def test_an_objective_may_be_negative_and_of_any_sign():
 
 
 def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
-    """A gait with such joints: its driven work is more than its work, and so it pays to look for
-    another."""
+    """Such joints' driven work is more than the work, so it pays to look for another gait."""
     problem = Problem("brake", SKEW, gait=Harmonic(1), objective="driven efficiency", delta=1e-3)
     before = replay(problem.body, problem.friction, SKEW, 1e-3, quantities=["driven_work"])
     assert before.values["driven_work"] > (1 + 1e-3) * before.work
@@ -218,8 +217,7 @@ def test_what_must_be_reached_is_stated_in_units_of_friction_too():
 
 
 def test_a_pace_counts_by_its_ratio_to_friction():
-    """Friction drives the momenta: with a tenth of it, at a tenth of the Froude number, a gait
-    moves as it did."""
+    """It drives momenta: with a tenth of it and of the Froude number a gait moves as before."""
     periods = []
     for size in (1.0, 0.1):
         space, v = space_near(

@@ -277,8 +277,7 @@ def test_time_that_is_over_gives_the_best_gait_so_far(thread):
 
 
 def test_the_best_gait_told_of_is_one_of_finite_size_and_stages_come_in_their_order():
-    """Here small loops are better from the first start on, and one of the gaits that lead the
-    sketches shrinks on its way."""
+    """Small loops are better from the first start on; a leading sketch shrinks on its way."""
     body, friction = Chain((0.4, 0.2, 0.4)), Friction(mu_t=2, mu_f=1, mu_b=1.4)
     problem = Problem("three", None, body, friction, Harmonic(1), delta=1e-3)
     seen = []

@@ -1,5 +1,4 @@
-"""What a wrong floor costs: derivatives of best values obey identities, and are those of optima
-that are sought again."""
+"""What a wrong floor costs: derivatives of best values obey identities and match new optima."""
 
 from dataclasses import replace
 
@@ -21,8 +20,7 @@ def found(three_link):
 
 
 def test_as_much_more_friction_all_round_costs_as_much(three_link, found):
-    """Forces are proportional to the coefficients, which the velocities do not notice: sum of mu
-    dV/dmu = -V."""
+    """Forces scale with the coefficients, which velocities do not notice: sum of mu dV/dmu = -V."""
     total = sum(found[f"friction {way}"].slope for way in WAYS)
     assert total == pytest.approx(-three_link.value, rel=2e-5)
     for way in WAYS:  # and so it is written
@@ -98,8 +96,7 @@ def test_a_slope_is_that_of_gaits_that_are_sought_again(three_link, found, of):
     ("name", "finer"), [("three_link_offset", 1e-8), ("three_link_fast", 1e-6)]
 )
 def test_slopes_on_a_finer_mesh_differ_by_no_more_than_the_errors(name, finer, solved, of):
-    """The gait on the mesh of an answer lies beside the true one, which moves slopes to first
-    order."""
+    """An answer's gait lies beside the true one, which moves slopes to first order."""
     rough = solved(name)[0]
     finely = {"delta_start": rough.problem.delta, "mesh_tolerance": finer}
     fine = colloc.solve(rough.problem.with_(guess=rough.gait, **finely), starts=1)

@@ -158,8 +158,7 @@ def test_the_error_of_a_mesh_is_known_interval_by_interval(uphill):
 
 @pytest.mark.slow
 def test_what_joints_give_back_and_can_do_counts_on_slopes(uphill):
-    """On the way up joints brake at times: driven work is more than work, by what they do not get
-    back."""
+    """Uphill joints brake at times: driven work is work and what they do not get back."""
     problem = PROBLEM.with_(objective="driven efficiency", torque_limit=0.05, power_limit=1.0)
     space, v = space_near(problem, uphill.gait, np.linspace(0.0, 1.0, 21))
     program = ReducedProgram(space, 1e-2)

@@ -19,8 +19,7 @@ ANISOTROPIC = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 
 @pytest.mark.parametrize("reference", [0, 2, 4])
 def test_a_stretch_that_rests_is_exactly_at_rest(reference):
-    """Rates vanish on [0, 1/2]; with the reference held there, so does its velocity, to the last
-    bit."""
+    """Rates vanish on [0, 1/2]; a reference held there has no velocity, to the last bit."""
     edges = np.linspace(0, 1, 9)[:, None]
     panels = PanelGrid(edges)
     s = panels.nodes
@@ -49,8 +48,7 @@ def test_many_starts_panels_and_methods_agree(motion, friction):
 
 
 def test_uniform_rotation_of_the_frame_is_undone():
-    """A shape that only turns its frame does not move: the frame turns back, and no work is
-    done."""
+    """A shape that only turns its frame rests: the frame turns back, without work."""
     turning = Motion(lambda s, t: 0.0 * s + 3.0 * t, lambda s, t: 0.0 * s + 3.0)
     solution = solve_smooth(turning, Friction(), np.array([0.0, 0.2]), 1e-6).require()
     assert_allclose(solution.z[2], -3.0, rtol=1e-14)
@@ -60,8 +58,7 @@ def test_uniform_rotation_of_the_frame_is_undone():
 
 @pytest.mark.parametrize("delta", [1e-4, 1e-8, 1e-12])
 def test_panels_resolve_the_layer_where_a_body_pivots(delta):
-    """A body hinged in the middle, its front half turning: compare with two straight links,
-    integrated in closed form."""
+    """Hinged in the middle, the front half turning: as two straight links in closed form."""
     width = 1e-6
 
     def step(s):
@@ -114,8 +111,7 @@ def shapes(body, n=3, seed=1):
 
 
 def plain(body, q, rates, z):
-    """Places and velocities ``(2, n_point, n_time)`` in the axes of Theta, and the tangents
-    there."""
+    """Places, velocities ``(2, n_point, n_time)`` in the axes of Theta; tangents and normals."""
     s = S[:, None] * np.ones(q.shape[1])
     theta, turning = body.tangent(s, q), body.turning(s, q, rates) + z[2]
     along, across = (

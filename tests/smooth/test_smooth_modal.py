@@ -60,8 +60,7 @@ def test_fourier_modes_hold_the_paper_s_wave_exactly():
 
 
 def test_a_straight_staircase_is_laid_into_the_line_through_it():
-    """A chain on a circle has headings in arithmetic progression; its nearest degree-one mode has
-    the circle's curvature."""
+    """A chain on a circle has evenly stepped headings; its degree-one mode has its curvature."""
     n = 40
     amplitudes = ModalBody(3).from_chain(np.full(n, 1.0 / n)) @ np.full(n - 1, 1.0 / n)
     np.testing.assert_allclose(amplitudes, [0.5, 0.0, 0.0], atol=2.0 / n**2)
@@ -99,8 +98,7 @@ def test_amplitudes_of_modes_may_exceed_the_limit_of_the_tangent_and_both_progra
 
 @pytest.mark.parametrize("basis", ["legendre", "fourier"])
 def test_a_gait_seen_from_the_other_end_backwards_in_time_is_the_same_gait(basis):
-    """The reversed swap keeps distance and work under every friction
-    (`colloc.results.comparison`), smooth bodies too."""
+    """The reversed swap keeps distance and work (`colloc.results.comparison`), smooth or not."""
     body, friction, t = ModalBody(4, basis), Friction(mu_t=2, mu_f=1, mu_b=3), np.arange(40) / 40
     gait, powers = wave(body, 0.8), []
     image = reversed_in_time(swap_ends(gait, body))

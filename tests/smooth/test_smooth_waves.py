@@ -35,8 +35,7 @@ ALONG = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
 
 
 def test_wave_B_to_eight_digits():
-    """Two unrelated discretisations in time and arc length agree to 8 digits, and with the design
-    notes' 0.737066."""
+    """Two unrelated discretisations agree to 8 digits, and with the design notes' 0.737066."""
     p = measured_period(Wave().prescribed(), ALONG, 1e-4, intervals=8)
     q = period(Wave().prescribed(), ALONG, 1e-4, intervals=3, nodes=7, panels=11, order=11)
     assert p.efficiency == pytest.approx(q.efficiency, abs=2e-9)
@@ -64,8 +63,7 @@ def chain_period(friction, n_link, delta=1e-4, instants=16):
 
 
 def test_wave_B_by_a_chain_of_links_extrapolated():
-    """Independent of all panels: links have closed-form friction; their quadratic error is
-    extrapolated away."""
+    """Links have closed-form friction, no panels; their quadratic error is extrapolated away."""
     coarse, fine = (np.array(chain_period(ALONG, n)) for n in (160, 320))
     d, W = (4 * fine - coarse) / 3
     smooth = period(Wave().prescribed(), ALONG, 1e-4, intervals=2)
@@ -248,8 +246,7 @@ def test_two_bumps_are_antisymmetric_and_keep_their_length():
 
 @pytest.mark.parametrize("crawler", [ONE, slow(SIDEWAYS)])
 def test_the_anchor_holds_and_the_stroke_is_the_geometry(crawler):
-    """The distance is what the shape shortens or shifts, less a creep of order delta; nothing
-    rotates."""
+    """The distance is what the shape shortens or shifts, less order delta; nothing rotates."""
     p = crawler.period(intervals=2, quadrature_tolerance=1e-8)
     assert p.d == pytest.approx(crawler.body.stroke, rel=2e-4)
     assert p.d < crawler.body.stroke
@@ -290,8 +287,7 @@ def test_backwards_is_forwards_with_the_coefficients_exchanged():
 
 
 def test_a_bump_that_takes_half_its_region_tears_the_anchor_loose_on_very_rough_sideways_friction():
-    """With mu_t = 10 the bump drags harder than the anchor's margin; a smaller share of the region
-    mends it."""
+    """At mu_t = 10 its drag exceeds the anchor's margin; a smaller share of the region mends it."""
     rough = ONE.with_(friction=Friction(mu_t=10.0, mu_f=1.0, mu_b=1.0), epsilon=0.02)
     loose, firm = (rough.with_(share=share).period(intervals=1, nodes=4) for share in (0.5, 0.15))
     assert loose.d < 0.8 * rough.body.stroke

@@ -1,5 +1,4 @@
-"""Many starts: admissible reproducible samples, gaits that are the same, archives, and runs that
-nothing stops."""
+"""Many starts: admissible reproducible samples, equal gaits, archives, runs that nothing stops."""
 
 import itertools
 import json

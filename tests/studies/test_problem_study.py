@@ -1,5 +1,4 @@
-"""Studies: where starts travel, that nothing depends on workers, what is kept, and one file that
-xarray opens."""
+"""Studies: where starts travel, no effect of workers, what is kept, one file that xarray opens."""
 
 import dataclasses
 import json

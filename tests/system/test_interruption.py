@@ -1,5 +1,4 @@
-"""Ctrl-C, and time that is over: a block ends in one KeyboardInterrupt, and compiled code does not
-swallow it."""
+"""Ctrl-C, time that is over: one KeyboardInterrupt ends a block, and compiled code passes it on."""
 
 import signal
 import sys
@@ -26,8 +25,7 @@ def pressed(times, seen, **options):
 
 
 def press(times=1, **options):
-    """What Ctrl-C does in a block: how often it was pressed before an exception came, and whether
-    the block knew."""
+    """How often Ctrl-C was pressed in a block before an exception came; did the block know?"""
     seen = {"pressed": 0, "known": False}
     with pytest.raises(KeyboardInterrupt):
         pressed(times, seen, **options)

@@ -149,8 +149,7 @@ def quick(tmp_path_factory):
 
 
 def shown(words, folder, code=0, **environment):
-    """What stands on the screen after a program, which ends with that exit code, hides no cursor
-    and leaves no progress."""
+    """The screen after a program that ends with this code, its cursor seen and no progress left."""
     pytest.importorskip("pty")
     ended, written = run_in_terminal([sys.executable, "-m", *words], folder, **environment)
     lines, cursor = screen(written)

@@ -1,5 +1,4 @@
-"""Full disks, folders that cannot be written, two writers: a clear error or both results, never a
-broken file."""
+"""Full disks, closed folders, two writers: a clear error or both results, never a broken file."""
 
 import contextlib
 import errno

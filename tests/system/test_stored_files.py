@@ -77,8 +77,7 @@ def test_damaged_pages_are_refused_in_a_sentence_or_read(tmp_path):
 
 
 def test_a_reader_finishes_what_a_killed_writer_began(tmp_path):
-    """The file in the middle of a transaction, with its rollback journal, as kill -9 leaves
-    both."""
+    """A file amid a transaction, with its rollback journal, as kill -9 leaves both."""
     path, left = tmp_path / "x.sqlite", tmp_path / "left.sqlite"
     put_rows(path, KIND, {"a": "x" * 10_000})
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:

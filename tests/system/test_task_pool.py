@@ -1,5 +1,4 @@
-"""The pool: nothing is lost with a worker, order may depend on results, one BLAS thread a
-process."""
+"""The pool: no loss with a worker, order may depend on results, one BLAS thread a process."""
 
 import os
 import signal
@@ -93,8 +92,7 @@ print(sorted(result for _, result in run_tasks(task, lambda: next(waiting, None)
 
 
 class Unreliable(Executor):
-    """Like a cluster that gives up on a task: an exception that is no result, every time for 4,
-    once for 2."""
+    """A cluster that gives up: an exception that is no result, every time for 4, once for 2."""
 
     failed: ClassVar[set] = set()
 
@@ -160,8 +158,7 @@ def test_workers_do_not_outlive_a_parent_that_is_killed():
 
 
 def test_ctrl_c_while_a_task_is_handed_over_leaves_the_executors_locks_open():
-    """It falls where a lock is taken already and no block would open it again, as in `with lock` of
-    CPython 3.13."""
+    """It falls where a lock is taken and no block reopens it: `with lock` of CPython 3.13."""
 
     class Locked(ThreadPoolExecutor):
         lock = threading.Lock()

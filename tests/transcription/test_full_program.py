@@ -66,8 +66,7 @@ def stated(case, **changes):
 
 
 def at_guess(problem, delta=0.1):
-    """The full program near the member nearest to the guess, its variables there, and the reduced
-    program with its parameters."""
+    """The full program near the guess, its variables; the reduced program, its parameters."""
     space, v = space_near(problem, problem.guess)
     reduced = ReducedProgram(space, delta)
     reduced.place_rows(v)
@@ -216,8 +215,7 @@ def test_functions_grow_neither_with_the_mesh_nor_with_the_links():
     [(3, "full", 620, 300), (6, "full", 1300, 600), (3, "implicit velocity", 170, 85)],
 )
 def test_nonzeros_grow_by_so_many_for_every_interval(links, formulation, jacobian, hessian):
-    """Half a period, three points an interval: sparsity is what keeps a solve linear in the
-    mesh."""
+    """Half a period, three points an interval: sparsity keeps a solve linear in the mesh."""
     counts = []
     for intervals in (20, 40):
         stated = {"gait": Harmonic(1, "antipodal"), "formulation": formulation}
@@ -343,8 +341,7 @@ def test_a_broken_balance_is_named_with_its_window(formulation, variable):
 
 
 def test_a_delta_that_rounding_hides_is_named():
-    """At delta = 1e-10 the flagship's gradient is noise of 2e-6; at 1e-9 it is still told from
-    zero."""
+    """At delta = 1e-10 the flagship's gradient is noise of 2e-6; at 1e-9 it is told from zero."""
     problem = plain()
     program = program_of(problem)
     x = program.feasible(problem.gait.parameters(problem.guess), 1e-10)
