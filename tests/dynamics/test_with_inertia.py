@@ -75,7 +75,7 @@ def test_the_kernel_and_the_symbolic_statement_have_the_derivatives_of_differenc
         np.testing.assert_allclose(found[:, k], (4 * near - far) / (3 * step), rtol=1e-7, atol=1e-7)
 
 
-@pytest.mark.parametrize("froude", [0.1, 0.5, pytest.param(0.003, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("froude", [0.1, 0.5, slow(0.003)])
 def test_shooting_and_collocation_find_the_same_motion(froude):
     reduced, v = program(problem(froude=froude, intervals=200))
     stated = reduced.space.control.problem

@@ -239,7 +239,8 @@ def test_a_wheel_says_which_of_the_two_laws_it_has():
 
 @pytest.mark.parametrize("wheel", [{"rolling": 1e-7}, {"rolling": 1.0, "sideways": 1e7}], ids=str)
 def test_wheels_that_roll_freely_or_hold_firmly_do_not_slip(wheel):
-    """To rolling over sideways friction times delta, not speed: nonholonomic at small ratios."""
+    """To rolling over sideways friction times delta, and not times the speed: it is nonholonomic at
+    any small ratio."""
     body = on_axles(**wheel)
     z = colloc.solve_balance(body, Friction(), *BENT, 1e-3).require().z
     known = [

@@ -19,8 +19,6 @@ from colloc.search.options import FINE
 from tests.shared.mechanics import with_inertia
 
 ROUND, STANDING_POWER = colloc.ellipse(A0=0, A1=2.2, B1=1.3), "distance / (work + 0.1 * period)"
-
-
 SKATING = colloc.Fourier(mean=[2.7, -2.7], cos=[[0.4], [0.0]], sin=[[0.0], [0.3]])
 
 

@@ -1,4 +1,5 @@
-"""Friction from motion, within the stated errors; what a motion does not tell is said."""
+"""Friction from motion: what moved under known coefficients is found to, within the stated errors;
+what a motion does not tell is said."""
 
 import json
 from types import SimpleNamespace
@@ -26,7 +27,8 @@ def crawled():
 def recorded(
     path, solution, seed=0, noise=2e-3, periods=2.0, per_period=100, point="", length=1.0, lasts=1
 ):
-    """Joint angles and places of a point, by a camera anywhere; noise lasts for so many samples."""
+    """A record of joint angles and of places of a point, from a camera that stands somewhere, whose
+    noise lasts for so many samples."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(periods * per_period)) / per_period
     motion = solution.sample(t)

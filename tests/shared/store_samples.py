@@ -6,6 +6,7 @@ import numpy as np
 
 from colloc import Axis, Fourier, Harmonic, Problem, Study, ellipse, load, save
 from colloc.results.archive import Archive, Outcome, StartName, open_archive
+from colloc.results.solution import SOLVED
 from colloc.studies import sweep as studies
 from colloc.system.row_file import CACHE, put_rows, read_rows
 from colloc.system.store_file import Table, array, attribute, open_file
@@ -22,9 +23,9 @@ def problem(x=1.0):
     return Problem("sample", ellipse(0.2, 1.2, 0.8), **fields, smallest_shape_speed=0.1 + 1e-6 * x)
 
 
-def outcome(start, efficiency=0.2):
+def outcome(start, efficiency=0.2, gait=GAIT, guess=None, status=SOLVED):
     numbers = 1e-7, 0.1, 0.5, 1e-4, 12, 1.5, 1.25, efficiency, 1e-7
-    return Outcome(start, "solved", "", GAIT, GAIT, efficiency, *numbers)
+    return Outcome(start, status, "", guess or gait, gait, efficiency, *numbers)
 
 
 def archive(path, starts=range(3)) -> Archive:

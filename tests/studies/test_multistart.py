@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shared.store_samples import GAIT
+from shared.store_samples import GAIT, outcome
 
 import colloc
 from colloc import BSpline, Chain, Fourier, Friction, Harmonic, Problem, StoreError, ellipse
@@ -43,11 +43,6 @@ PROBLEM = Problem(name="quick", gait=Harmonic(1, "bilateral"), guess=ellipse(0.2
 
 def problem(**changes):
     return Problem("quick", **{"guess": ROUND, **USUAL, **changes})
-
-
-def outcome(start, gait=GAIT, efficiency=0.2, status=SOLVED):
-    numbers = 1e-7, 0.1, 0.5, 1e-4, 12, 1.5, 1.25, efficiency, 1e-7
-    return archives.Outcome(start, status, "", gait, gait, efficiency, *numbers)
 
 
 def name(start, seed=0):
@@ -130,16 +125,18 @@ def test_an_optimum_on_the_speed_floor_says_so():
     assert on_speed_floor(stated, solution.gait)
     assert "smallest_shape_speed = 2" in solution.message
     assert not on_speed_floor(stated, large)
-    lines = starts_summary(stated, [outcome(0, solution.gait), outcome(1, large)], None)[2]
+    lines = starts_summary(stated, [outcome(0, gait=solution.gait), outcome(1, gait=large)], None)[
+        2
+    ]
     assert sum("on the bound smallest_shape_speed" in line for line in lines) == 1
 
 
 def test_basins_join_images_of_one_gait_and_nothing_else():
     stated = problem(friction=REVERSIBLE, gait=Harmonic(2))
     found = images(GAIT, Chain(), REVERSIBLE)
-    same = [outcome(k, shift_phase(image, 0.1 * k)) for k, image in enumerate(found)]
-    other = outcome(20, Fourier(GAIT.mean + 0.3, GAIT.cos, GAIT.sin))
-    better, failed = outcome(21, GAIT, 0.21), outcome(22, status=ERROR)
+    same = [outcome(k, gait=shift_phase(image, 0.1 * k)) for k, image in enumerate(found)]
+    other = outcome(20, gait=Fourier(GAIT.mean + 0.3, GAIT.cos, GAIT.sin))
+    better, failed = outcome(21, 0.21), outcome(22, status=ERROR)
     found = archives.basins(stated, [*same, other, better, failed])
     assert [b.best.efficiency for b in found] == [0.21, 0.2, 0.2]
     assert sorted(len(b.starts) for b in found) == [1, 1, 8]
@@ -158,8 +155,8 @@ def test_an_archive_comes_back_to_the_bit_with_gaits_of_every_class(kind, gait, 
     path, stated = tmp_path / "sub" / "a.h5", problem(gait=kind, guess=gait)
     archive = open_archive(stated, path)
     assert archive.outcomes == {}
-    failed = outcome(1, gait, np.nan, ERROR)
-    archive.add({name(4, 7): outcome(4, gait, 1 / 3), name(1, 7): failed})
+    failed = outcome(1, np.nan, gait, status=ERROR)
+    archive.add({name(4, 7): outcome(4, 1 / 3, gait), name(1, 7): failed})
     back = open_archive(stated, path)
     assert back.outcomes.keys() == archive.outcomes.keys()
     done = (back.done(SAMPLERS[0], 7, 4 + 1, retry=again) for again in (False, True))
@@ -252,8 +249,8 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
         assert settings == {"sampler": SAMPLERS[0], "workers": 3, "time_limit": 7.0}
         for k in numbers:
             asked.append(k)
-            archive.add({name(k, seed): outcome(k, ROUND)})
-            yield outcome(k, ROUND)
+            archive.add({name(k, seed): outcome(k, gait=ROUND)})
+            yield outcome(k, gait=ROUND)
 
     assert "0 starts done already, 2 to go" in run("--starts", 2)[1]
     assert sorted(kept().of_search(SAMPLERS[0], 0)) == [0, 1]
@@ -292,7 +289,7 @@ def test_more_starts_than_memory_holds_begin_at_once_one_by_one(tmp_path, capsys
     def solved(function, ready, **settings):
         for _ in range(3):
             task = ready()
-            yield task, outcome(task.key, ROUND)
+            yield task, outcome(task.key, gait=ROUND)
         raise _Enough
 
     def run(begun):

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from shared.store_samples import load_study
+from shared.store_samples import load_study, outcome
 
 import colloc
 from colloc import Axis, Chain, Fourier, Friction, Harmonic, ModalBody, Problem, Study, ellipse
@@ -21,7 +21,7 @@ from colloc.commands.families import sweep_summary
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.harmonic import shift_phase
 from colloc.gaits.linear import Combination
-from colloc.results.archive import CRASHED, PASSED_OVER, Outcome
+from colloc.results.archive import CRASHED, PASSED_OVER
 from colloc.results.comparison import reversed_in_time, swap_ends
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import sweep as study_run
@@ -53,21 +53,16 @@ def grid(**changes):
     return Study(**{"name": "grid", "axes": axes, "problem": problem, **changes})
 
 
-def outcome(start, guess, gait, efficiency, status=SOLVED):
-    numbers = 1e-7, 0.1, 0.5, 1e-4, 3, 0.1, 0.1, efficiency, 1e-7
-    return Outcome(start, status, "", guess, gait, efficiency, *numbers)
-
-
 def landscape(stated, start_from, start, time_limit, **_):
     """In place of a solve: two basins, parted by the amplitude of the first joint; only 0.9 of the
     way is kept each time."""
     guess = start_from()
     good, law = guess.cos[0, 0] > 1.5, stated.friction
     if law.mu_t == 3.0 and law.mu_b == 2.0:
-        return outcome(start, guess, guess, np.nan, NOT_CONVERGED)
+        return outcome(start, np.nan, guess, status=NOT_CONVERGED)
     way = 0.9 * ((2.0 if good else 1.0) - guess.cos[0, 0]) * np.array([[1], [-1]])
     gait = Fourier(guess.mean, guess.cos + way, guess.sin)
-    return outcome(start, guess, gait, (0.3 if good else 0.2) + 0.01 * law.mu_t)
+    return outcome(start, (0.3 if good else 0.2) + 0.01 * law.mu_t, gait, guess)
 
 
 @pytest.fixture
@@ -204,8 +199,8 @@ def test_a_cell_below_what_a_neighbours_gait_achieves_is_marked(fake, tmp_path, 
         # in the cell (1, 1) every search ends in the poor basin; elsewhere the guess is good
         guess, law = start_from(), stated.friction
         if (law.mu_t, law.mu_b) == (2.0, 2.0):
-            return outcome(start, guess, guess, 0.22)
-        return outcome(start, guess, ellipse(0.0, 2.0, 0.25 * law.mu_t), 0.3 + 0.01 * law.mu_t)
+            return outcome(start, 0.22, guess)
+        return outcome(start, 0.3 + 0.01 * law.mu_t, ellipse(0.0, 2.0, 0.25 * law.mu_t), guess)
 
     def known(p, g, *_):  # of two gaits of neighbours one is the better here
         return 0.31 - 0.2 * abs(g.sin[0, 0] - 0.5)
@@ -392,7 +387,7 @@ def test_classes_of_gaits_are_an_axis_and_kept_exactly(tmp_path, monkeypatch):
     def next_to(stated, start_from, start, time_limit, **_):
         guess = start_from()
         gait = study_run.member(stated, guess)
-        return outcome(start, guess, gait, study_run.value_of(stated, gait))
+        return outcome(start, study_run.value_of(stated, gait), gait, guess)
 
     monkeypatch.setattr(study_run, "run_guess", next_to)
     study = Study("kinds", (Axis("kind", tuple(CLASSES)),), in_class, cold_starts=0)

@@ -66,7 +66,8 @@ def stated(case, **changes):
 
 
 def at_guess(problem, delta=0.1):
-    """The full program near the guess, its variables; the reduced program, its parameters."""
+    """The full program near the member nearest to the guess, its variables there, and the reduced
+    program with its parameters."""
     space, v = space_near(problem, problem.guess)
     reduced = ReducedProgram(space, delta)
     reduced.place_rows(v)
