@@ -17,8 +17,7 @@ import pytest
 from filelock import FileLock
 
 matplotlib.use("Agg")
-# a run in the background of a shell script ignores Ctrl-C, and so would the programs that the tests
-# interrupt
+# a run in the background of a script ignores Ctrl-C, and so would programs that tests interrupt
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 ROOT = Path(__file__).resolve().parents[1]

@@ -132,8 +132,7 @@ def test_what_a_quantity_is_proportional_to_follows_from_its_formula():
     mixed = Quantity("mixed", "sum(moment**2 + rate**2)")
     assert [each.friction_degree for each in (heat, effort, mixed)] == [2.0, 1.0, None]
     assert [each.pace_degree for each in (heat, effort, mixed)] == [0.0, 1.0, None]
-    # what has a scale of its own is proportional to nothing, though beyond that scale it seems to
-    # be
+    # with a scale of its own it is proportional to nothing, though beyond that scale it seems so
     soft = Quantity("soft", "sum(tanh((moment / 0.01)**2))")
     gears = Quantity("gears", "sum(abs(rate) * where(abs(rate) > 17, 9, 1))")
     assert soft.friction_degree is None

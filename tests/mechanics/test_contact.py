@@ -292,8 +292,7 @@ def test_clearance_never_allows_a_crossing_and_forbids_little_else(body):
 
 
 def test_parallel_links_that_slip_through_each_other_are_caught():
-    # links 1 and 4 are parallel at every instant, and their distance passes through zero between
-    # two samples
+    # links 1 and 4 are always parallel; their distance passes through zero between two samples
     body = Chain((0.3, 0.2, 0.2, 0.3))
     tilt = np.array([-0.03, -0.01, 0.01, 0.03])
     angles = np.stack([tilt - 1.0, np.full(4, 2.0), np.pi - 1.0 - tilt])

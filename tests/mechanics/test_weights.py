@@ -42,8 +42,7 @@ def test_the_largest_forces_are_reached_by_links_that_slide_along_across_or_turn
     np.testing.assert_allclose(found[:3, :2].max(axis=1), along)
     np.testing.assert_allclose(found[3:6, 2], across)
     np.testing.assert_allclose(along, max(mu[1:]) * np.array(WEIGHTS))
-    # a link that turns about its middle pushes back alike on both halves: the couple is that of
-    # half its weight a quarter away
+    # a link that turns about its middle has the couple of half its weight a quarter away
     turn = np.array([[0.0], [-LENGTHS[0] / 2], [1.0]])
     spinning = body.forces(law, straight[:, :1], straight[:, :1], turn, 1e-9)
     assert abs(spinning[6, 0]) == pytest.approx(couples[0])

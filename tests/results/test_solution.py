@@ -70,8 +70,7 @@ def test_sampled_motion_is_consistent(symmetry, three_link):
     assert np.median(np.abs(motion.z - exact.z)) < 2e-3
     centre = body.motion(law, motion.angles, motion.rates, solution.answer.delta, exact).centre
     turn, plane = np.exp(1j * motion.theta), np.array([1, 1j])
-    # theta' = omega; centre and tail move with their own velocities, through the symmetry's second
-    # half
+    # theta' = omega; centre and tail move with their own velocities, in the second half too
     assert np.abs(np.diff(motion.theta)).max() < 20 * dt
     for pose, rate in (
         (motion.theta, motion.z[2]),
@@ -99,8 +98,7 @@ def turning(unsolved):
 
 def test_a_gait_that_turns_moves_on_from_where_a_period_left_it(turning):
     assert abs(turning.rotation) > 0.1
-    # what the tail velocity says adds up to the pose across the ends of periods, also of those
-    # before the first
+    # the tail velocity adds up to the pose across ends of periods, also before the first
     t, plane = np.linspace(-1.3, 2.4, 3701), np.array([1, 1j])
     motion, dt = turning.sample(t), t[1] - t[0]
     velocity = np.exp(1j * motion.theta) * (plane @ motion.z[:2])

@@ -125,9 +125,8 @@ def test_an_optimum_on_the_speed_floor_says_so():
     assert on_speed_floor(stated, solution.gait)
     assert "smallest_shape_speed = 2" in solution.message
     assert not on_speed_floor(stated, large)
-    lines = starts_summary(stated, [outcome(0, gait=solution.gait), outcome(1, gait=large)], None)[
-        2
-    ]
+    found = [outcome(k, gait=gait) for k, gait in enumerate((solution.gait, large))]
+    lines = starts_summary(stated, found, None)[2]
     assert sum("on the bound smallest_shape_speed" in line for line in lines) == 1
 
 

@@ -239,8 +239,7 @@ def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
     assert abs(exact.rotation) > 0.01
     sure = max((exact.distance - 0.5 * abs(exact.rotation)) / exact.work, 0.0)
     assert study_run.value_of(stated, gait) == pytest.approx(sure, abs=1e-3 * exact.efficiency)
-    # where it could add all of it nothing counts, not even by the square of what is less than
-    # nothing
+    # where it could add all of it nothing counts, nor does the square of less than nothing
     turning = Fourier([0.6, 0.6], [[0.5], [-0.3]], [[0.1], [0.5]])
     turned = replay(*at, turning, stated.delta, instants=200, tolerance=1e-3)
     assert 0.5 * abs(turned.rotation) > turned.distance > 0.01
@@ -463,8 +462,7 @@ def test_a_gait_is_standing_if_it_goes_back_its_way_or_hardly_has_a_wave_or_hard
 
 @pytest.mark.parametrize(("mu_t", "kind"), [(20.0, "retrograde, both"), (0.1, "direct, both")])
 def test_snakes_move_against_their_wave_and_bristle_worms_with_it(mu_t, kind):
-    # the paper, section I: retrograde waves where transverse friction is large, direct ones where
-    # it is small
+    # the paper, section I: retrograde waves at large transverse friction, direct ones at small
     for sign in (1, -1):
         gait = Fourier([0, 0], [[0.4], [0.0]], [[0.0], [sign * 0.4]])
         # modes bend the body everywhere, which makes less of a step from place to place
