@@ -153,14 +153,14 @@ def test_the_search_ends_once_starts_met_the_best_often(
     assert [each.iterate.objective for each in candidates] == [-1.0, -2.0]
 
 
-def test_a_search_goes_on_from_gaits_that_are_known_before_its_starts(monkeypatch):
+def test_a_search_for_a_least_distance_begins_at_the_gaits_that_go_farthest(monkeypatch):
     begun = []
     monkeypatch.setattr(explore, "sketch", lambda coarse, *at: begun.append(at[:2]))
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
-    problem = Problem("known", gait=Harmonic(1, "bilateral"))
-    multistart(problem, 1, [GAIT])
+    monkeypatch.setattr(explore, "farthest", lambda far: [SimpleNamespace(value=0.2, gait=GAIT)])
+    solve(Problem("far", gait=Harmonic(1, "bilateral"), delta=1e-2, least_distance=0.1), 2)
     assert begun[0] == (GAIT, False)
-    assert begun[1] == (problem.guess, True)
+    assert begun[1][1]
 
 
 def test_with_a_little_inertia_one_start_leads_to_what_many_lead_to_in_slow_motion():
@@ -222,6 +222,27 @@ def test_gaits_are_solved_for_until_one_holds_and_none_promises_more(
     optima = [SimpleNamespace(value=1.0 - 0.1 * k, strays=k < first) for k in range(len(ends))]
     found = stages._finish_best(UNEQUAL.with_(shrinking=True), optima)
     assert (len(found), len(asked), asked[0]) == (solved_for, solved_for, optima[first])
+
+
+def test_ends_off_the_motion_in_time_are_no_reason_to_follow_no_more_and_give_way_to_twins(
+    monkeypatch,
+):
+    space, problem = SimpleNamespace(mesh=SimpleNamespace(n=9)), Problem("ends")
+    usual = {"violation": 0.0, "gait": GAIT, "delta": 1.0, "space": space}
+    ends = [
+        SimpleNamespace(
+            basin=min(k, 3) if k < 5 else k, strays=k < 4, objective=x, value=-x, **usual
+        )
+        for k, x in enumerate((-1.0, -0.999, -0.998, -0.997, -0.996, -0.995, -0.994, -0.993))
+    ]
+    monkeypatch.setattr(explore, "follow", lambda problem, candidate: candidate)
+    monkeypatch.setattr(explore, "same_gait", lambda problem, a, b: a.basin == b.basin)
+    monkeypatch.setattr(explore, "space_near", lambda problem, gait: (space, None))
+    monkeypatch.setattr(explore, "_best", lambda iterates: None)
+    candidates = [explore.Candidate(end, 1, dry_objective=-1.0) for end in ends]
+    explored = explore._follow_promising(problem, candidates, 8)
+    assert [end.basin for end in explored.optima] == [0, 1, 2, 3, 5, 6, 7]
+    assert [end.strays for end in explored.optima[:4]] == [True, True, True, False]
 
 
 def test_where_no_certificate_holds_the_best_of_gaits_that_were_left_is_the_answer(monkeypatch):
