@@ -463,9 +463,9 @@ def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int
     close_finite = max(close, (1 - OPTIONS.close) * min(finite, default=0.0))
     for k, (optimum, candidate) in enumerate(ends):
         if optimum.objective <= (close_finite if is_visible(optimum.gait) else close):
-            whole, v = space_near(problem, optimum.gait)
-            if whole.mesh.n == optimum.space.mesh.n:
-                continue
+            (whole, v), edges = space_near(problem, optimum.gait), optimum.space.mesh.edges
+            if len(edges) == whole.mesh.n + 1 and np.allclose(edges, whole.mesh.edges):
+                continue  # it is optimal there
             with suppress(CollocError):
                 on_whole = optimise(whole, v, optimum.delta, MEDIUM)
                 ends[k] = on_whole.after(optimum.history), candidate

@@ -227,7 +227,8 @@ def test_gaits_are_solved_for_until_one_holds_and_none_promises_more(
 def test_ends_off_the_motion_in_time_are_no_reason_to_follow_no_more_and_give_way_to_twins(
     monkeypatch,
 ):
-    space, problem = SimpleNamespace(mesh=SimpleNamespace(n=9)), Problem("ends")
+    mesh, problem = SimpleNamespace(n=9, edges=np.linspace(0, 1, 10)), Problem("ends")
+    space = SimpleNamespace(mesh=mesh)
     usual = {"violation": 0.0, "gait": GAIT, "delta": 1.0, "space": space}
     ends = [
         SimpleNamespace(
