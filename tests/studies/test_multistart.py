@@ -218,7 +218,7 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
     assert good.iterations > 0
     assert (bad.status, bad.message) == (ERROR, "ZeroDivisionError: one bad start")
     assert slow.status == TIME_LIMIT
-    assert "the last optimum was at delta = 1.0e-01" in slow.message
+    assert "the last optimum was at delta = 4.0e-03" in slow.message
 
 
 def test_a_worker_that_dies_costs_one_start(monkeypatch):
