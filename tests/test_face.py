@@ -108,7 +108,8 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
     np.testing.assert_array_equal(dataset.joint_angles.sel(joint=2), motion.angles[1])
     np.testing.assert_array_equal(dataset.centre.sel(axis="x"), motion.centre[0])
     np.testing.assert_array_equal(frame.tail_velocity_omega, motion.z[2])
-    assert dataset.power.attrs["units"] == "weight length/period"
+    units = {"power": "weight length/period", "joint_rates": "rad/period", "centre": "length"}
+    assert {name: dataset[name].attrs["units"] for name in units} == units
     assert dataset.attrs["efficiency"] == three_link.certificate.efficiency
     # labelled angles come back as the gait they are of, whatever the order of their dimensions
     back = fitted_gait(three_link.to_xarray().joint_angles.transpose(), 2, period=1.0).gait

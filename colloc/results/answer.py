@@ -152,7 +152,8 @@ class Answer:
 
     def sample(self, t: np.ndarray | float) -> SampledMotion:
         """Motion at phases t; periods follow each other. The centre of mass is at the origin at t =
-        0, and the first period's displacement along +x; on a slope +x is straight uphill."""
+        0, and the first period's displacement along +x, or its mean circle if it is asked to turn;
+        on a slope +x is straight uphill."""
         t = finite_array("t", np.atleast_1d(t), 1)
         period, phase = np.divmod(t, 1.0)
         problem, body = self.problem, self.problem.body

@@ -111,12 +111,17 @@ class Arc(NamedTuple):
 def arc(angle: float, centre: np.ndarray) -> Arc:
     """Arc of a cycle with a turn [rad] and a path of the centre of mass ``(2, n)`` in equal
     steps."""
+    return Arc(angle, abs(way_on_circle(angle, centre)))
+
+
+def way_on_circle(angle: float, centre: np.ndarray) -> complex:
+    """Displacement of a cycle on its mean circle, with the arguments of `arc`."""
     path = centre[0] + 1j * centre[1]
     t = np.linspace(0.0, 1.0, path.size)
     turn, displacement = np.exp(1j * angle) - 1, path[-1] - path[0]
     # integrated by parts, which needs no velocities; the integrand is periodic
     integrand = np.exp(-1j * angle * t) * (turn * (path - path[0]) + displacement)
-    return Arc(angle, float(abs(np.trapezoid(integrand, t))))
+    return complex(np.trapezoid(integrand, t))
 
 
 class Column(NamedTuple):

@@ -29,10 +29,10 @@ from colloc.mechanics.law import rate_independent
 from colloc.results.motion import (
     Column,
     SampledMotion,
-    arc,
     motion_dataset,
     motion_with_inertia,
     rotate,
+    way_on_circle,
 )
 from colloc.results.solution import Solution, direction_of_travel
 from colloc.system.arguments import check_range
@@ -111,9 +111,11 @@ class _MotionWithInertia:
         self.distance, self._heading = totals["distance"], 0.0
         if not regime.slides:
             path = self._course.at(np.linspace(0.0, 1.0, _INSTANTS + 1))[4:6]
-            self.distance = arc(self.rotation, path).chord
-            end = self._course.states[4:6, -1]
-            self._heading = float(np.arctan2(end[1], end[0])) - 0.5 * self.rotation
+            self.distance = abs(chord := way_on_circle(self.rotation, path))
+            end = complex(*self._course.states[4:6, -1])
+            if solution.problem.rotation:  # its circle sets out along +x
+                end = chord * np.exp(-0.5j * self.rotation)
+            self._heading = float(np.angle(end))
 
     def sample(self, t: np.ndarray) -> SampledMotion:
         """Motion at ascending phases in [0, 1], in the axes of `Solution.sample`."""

@@ -28,6 +28,7 @@ from colloc.gaits.problem_file import read_problem_file
 from colloc.results.store import save_result
 from colloc.search.checkpoint import Run
 from colloc.system.row_file import CACHE, put_rows
+from tests.conftest import ROOT
 from tests.shared.cases import slow
 
 QUICK = """
@@ -40,6 +41,7 @@ needs_full = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such
 needs_bash = pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
 OK = (0, 4)
 """Solved; certified or not, at so large a delta."""
+LETTERS = "# Länge der Schlange: µ_t = 1" + QUICK
 
 
 @pytest.fixture
@@ -248,12 +250,18 @@ def test_a_command_that_was_interrupted_says_so_whatever_became_of_the_interrupt
 
 
 @pytest.mark.parametrize(
-    "words", ["report", "animate --periods 1 --seconds 0.3 --width 200", "export --period 4"]
+    "words",
+    [
+        f"report --problem {ROOT}/problems/three_link.py",
+        "animate --periods 1 --seconds 0.3 --width 200",
+        "export --period 4",
+    ],
 )
 def test_json_is_one_object_on_standard_output(words, result, capsys):
     command, *options = words.split()
     assert colloc([command, str(result), *options, "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
+    assert command != "report" or b"agrees with 0.259" in Path(said["file"]).read_bytes()
     assert "bytes" not in said or os.path.getsize(said["file"]) == said["bytes"]
 
 
@@ -388,9 +396,6 @@ def test_an_interrupted_command_goes_on_from_its_last_problem(name, tmp_path, mo
     assert colloc(command) == 0
     assert set(computed) == {second}
     assert not list(tmp_path.glob("**/*.sqlite"))
-
-
-LETTERS = "# Länge der Schlange: µ_t = 1" + QUICK
 
 
 def run(words, without=(), **environment):

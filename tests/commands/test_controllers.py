@@ -12,6 +12,15 @@ import colloc
 from colloc import save
 from colloc.commands.results import export
 
+CLAMP = "--clamp 1000 2000 900 3000"
+CLAMPED = np.array([[1000, 900], [2000, 3000]])[..., None]
+PULSES = {
+    "": (1500, 100 / 9, (1, 1), (500, 2500)),
+    "--sign 1 -1": (1500, 100 / 9, (1, -1), (500, 2500)),
+    "--neutral 2048 --scale 11.378": (2048, 11.378, (1, 1), (-np.inf, np.inf)),
+    f"--scale 8 10 --neutral 1500 1480 {CLAMP}": ((1500, 1480), (8, 10), (1, 1), CLAMPED),
+}
+
 
 @pytest.fixture
 def sent(three_link, tmp_path):
@@ -29,16 +38,6 @@ def sent(three_link, tmp_path):
 def angles_of(path):
     data = json.loads((path.parent / "x.json").read_text())
     return [np.array(data[name]) for name in ("angles_rad", "speeds_rad_per_s")]
-
-
-CLAMP = "--clamp 1000 2000 900 3000"
-CLAMPED = np.array([[1000, 900], [2000, 3000]])[..., None]
-PULSES = {
-    "": (1500, 100 / 9, (1, 1), (500, 2500)),
-    "--sign 1 -1": (1500, 100 / 9, (1, -1), (500, 2500)),
-    "--neutral 2048 --scale 11.378": (2048, 11.378, (1, 1), (-np.inf, np.inf)),
-    f"--scale 8 10 --neutral 1500 1480 {CLAMP}": ((1500, 1480), (8, 10), (1, 1), CLAMPED),
-}
 
 
 @pytest.mark.parametrize("options", PULSES)

@@ -170,12 +170,14 @@ def test_bad_problems_get_one_clear_sentence_and_exit_code_two(text, tmp_path, c
 
 
 def test_a_good_problem_is_solved_saved_and_drawn(tmp_path, capsys):
-    (tmp_path / "p.py").write_text(GOOD, encoding="utf-8")
+    known = "REFERENCE = Reference(0.3, 0.1, 'a paper')\n"
+    (tmp_path / "p.py").write_text(GOOD + known, encoding="utf-8")
     assert colloc(["solve", f"{tmp_path}/p.py", "--output", f"{tmp_path}/out", "--pdf"]) == 0
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"quick.h5", "quick.png", "quick.pdf"}
     printed = capsys.readouterr().out
     assert "efficiency d/W" in printed
+    assert "a paper" in printed
     assert "delta had to be lowered from 0.3" in printed
 
 
@@ -184,8 +186,11 @@ def test_a_failed_solve_is_kept_apart_and_replaces_no_good_result(tmp_path, caps
     good = tmp_path / "quick.h5"
     good.write_bytes(b"a good result")
     monkeypatch.setattr("colloc.search.confirm.TOLERANCES", Tolerances(kkt=1e-30))
-    assert colloc(["solve", f"{tmp_path}/p.py", "--output", str(tmp_path), "--no-figure"]) == 3
-    assert "not converged" in capsys.readouterr().out
+    words = f"{tmp_path}/p.py --output {tmp_path} --no-figure --front"
+    assert colloc(["solve", *words.split()]) == 3
+    said, complaint = capsys.readouterr()
+    assert "not converged" in said
+    assert "no front, as the answer is not verified" in complaint
     assert good.read_bytes() == b"a good result"
     assert (tmp_path / "quick.failed.h5").exists()
 

@@ -21,6 +21,14 @@ from tests.shared.cases import slow_but
 # of a worm of three segments whose second axis points down
 LINKS = {"tail": (0.12, 0.05), "mid": (0.20, 0.06), "head": (0.28, 0.05)}
 LIMIT = '<limit lower="-0.5" upper="1.2" effort="1.5" velocity="5"/>'
+THERE = {
+    "strips": Chain((0.2, 0.3, 0.3, 0.2), width=0.02),
+    "weights": Chain((0.25, 0.35, 0.4), weights=(0.3, 0.3, 0.4), feet=1),
+    "feet": Chain((0.25, 0.35, 0.4), feet=(Foot(0, 0.2), Foot(1), Foot(2, 0.9))),
+}
+
+
+QUICK = [("urdf", "strips"), ("xml", "weights"), ("urdf", "feet")]
 
 
 def link(name, mass=0.1, at="0 0 0", more=""):
@@ -122,6 +130,7 @@ def test_free_hinges_across_are_wheels_and_spheres_under_a_box_feet(tmp_path):
     body = read(tmp_path, [*stands, *WORM[3:]]).body
     assert [foot.place for foot in body.feet] == pytest.approx([0.3, 0.25, 0.3])
     assert read(tmp_path, [*stands, *WORM[3:]], "--wheels").body.feet[0].kind == "wheel"
+    assert len(read(tmp_path, [*stands, *WORM[3:]], "--feet", "2").body.feet) == 6
 
 
 def feet(body):
@@ -129,16 +138,6 @@ def feet(body):
         (f.kind, f.link, *(round(x, 5) for x in (f.place, f.weight, f.offset, f.extent, f.angle)))
         for f in body.standing_on
     ]
-
-
-THERE = {
-    "strips": Chain((0.2, 0.3, 0.3, 0.2), width=0.02),
-    "weights": Chain((0.25, 0.35, 0.4), weights=(0.3, 0.3, 0.4), feet=1),
-    "feet": Chain((0.25, 0.35, 0.4), feet=(Foot(0, 0.2), Foot(1), Foot(2, 0.9))),
-}
-
-
-QUICK = [("urdf", "strips"), ("xml", "weights"), ("urdf", "feet")]
 
 
 @pytest.mark.parametrize(("kind", "body"), slow_but(QUICK, product(("urdf", "xml"), THERE)))

@@ -22,6 +22,9 @@ from colloc.results.robot import joint_torques, limit_lines
 from tests.shared.cases import slow_but
 
 LOOP = ellipse(0.0, 1.2, 0.8)
+STATED = ("distance", "work", "rotation", "length")
+NUMBERS = [*STATED, "distance_error", "work_error", *checks.NUMBERS, "driven_work"]
+NUMBERS.remove("instants")
 
 
 def test_verify_certifies_without_loading_casadi_or_matplotlib(three_link, tmp_path):
@@ -50,8 +53,13 @@ def test_verify_finds_a_tampered_gait(three_link, tmp_path, capsys):
     x[three_link.answer.layout.parameters[1, 0]] += 0.05
     tampered = replace(three_link, answer=replace(three_link.answer, x=x))
     file = save(tampered, tmp_path / "gait.h5")
-    assert recheck.verify([str(file)]) == 4
-    assert "NOT VERIFIED" in capsys.readouterr().out
+    failed = replace(three_link, answer=replace(three_link.answer, optimal=False))
+    for path, said in (
+        (file, "three_link: NOT VERIFIED"),
+        (save(failed, tmp_path / "failed.h5"), "the solve itself ended as: not converged."),
+    ):
+        assert recheck.verify([str(path)]) == 4
+        assert said in capsys.readouterr().out
 
 
 def test_verify_holds_the_interval_of_dry_friction_in_a_file_against_its_own(three_link, tmp_path):
@@ -59,11 +67,6 @@ def test_verify_holds_the_interval_of_dry_friction_in_a_file_against_its_own(thr
         dry = tuple(factor * end for end in three_link.dry().efficiency)
         stated = replace(three_link, certificate=replace(three_link.certificate, dry=dry))
         assert recheck.verify([str(save(stated, tmp_path / "dry.h5"))]) == code
-
-
-STATED = ("distance", "work", "rotation", "length")
-NUMBERS = [*STATED, "distance_error", "work_error", *checks.NUMBERS, "driven_work"]
-NUMBERS.remove("instants")
 
 
 @pytest.mark.parametrize("name", NUMBERS)

@@ -21,6 +21,14 @@ from colloc.pictures.figure import draw_filmstrip, draw_lab, forbidden, panels
 from colloc.pictures.style import save as save_figure
 from tests.shared.cases import slow, slow_but
 
+STANDS = (
+    Foot(0),
+    *(Wheel(1, 0.3, offset=side * 0.05, angle=side * 0.6) for side in (1, -1)),
+    Pad(2, 0.2, 0.8),
+    Wheel(3),
+)
+COMMANDS = (slow("report one.h5"), slow("animate one.h5 --periods 1 --seconds 0.2 --width 200"))
+
 
 def crawler(n_link, size=0.6):
     """A travelling wave along a chain."""
@@ -58,14 +66,6 @@ def test_joints_of_a_robot_are_named_above_the_panels_in_colours_that_differ(n_l
     for axes in figure.axes:
         assert axes.get_legend().get_window_extent().y0 >= axes.bbox.y1
         assert len({to_hex(line.get_color()) for line in axes.lines}) == n_link - 1
-
-
-STANDS = (
-    Foot(0),
-    *(Wheel(1, 0.3, offset=side * 0.05, angle=side * 0.6) for side in (1, -1)),
-    Pad(2, 0.2, 0.8),
-    Wheel(3),
-)
 
 
 def test_bars_of_wheels_and_pads_lie_along_them(unsolved):
@@ -161,9 +161,6 @@ def test_no_shape_that_is_allowed_lies_in_the_grey(body, limit, plane, share):
     column, row = (np.abs(grid[:, None] - allowed[j]).argmin(axis=0) for j in plane)
     # no deeper than the nearest point of the grid may be
     assert excess[row, column].max() < 2.5 * (grid[1] - grid[0])
-
-
-COMMANDS = (slow("report one.h5"), slow("animate one.h5 --periods 1 --seconds 0.2 --width 200"))
 
 
 def python(*words, folder=None, **environment):

@@ -13,6 +13,7 @@ import pytest
 
 import colloc
 from colloc import Chain, Fourier, Friction, Harmonic, Problem, Reference, Solution, ellipse
+from colloc.commands.solve import summary_dict
 from colloc.pictures.movie import frames
 from colloc.pictures.report_page import report_page
 from colloc.results.checks import Check
@@ -29,6 +30,11 @@ BROWSER = next(
 )
 VOID = {"meta", "br", "hr", "input", "img", "link"}
 """Elements without an end tag."""
+EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&<!--"
+NO_SLIDERS = {
+    "nine": (Fourier(np.zeros(8), np.full((8, 1), 0.1), np.eye(8, 1)), Chain((1 / 9,) * 9)),
+    "feet": (ellipse(0.0, 1.0, 1.0), Chain((1 / 3,) * 3, feet=1), Friction(), Harmonic(1)),
+}
 
 
 class Outline(HTMLParser):
@@ -96,9 +102,6 @@ def test_the_page_needs_no_network_and_no_other_file(page):
     policy = [value for tag, _, value in seen.attributes if tag == "meta" and "default" in value]
     assert policy[0].startswith("default-src 'none'")
     assert not {tag for tag, _, _ in seen.attributes} & {"link", "iframe", "object", "embed", "img"}
-
-
-EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&<!--"
 
 
 def test_a_reader_who_hears_the_page_is_told_what_is_drawn_and_can_scroll_with_the_keyboard(page):
@@ -253,6 +256,8 @@ def test_feet_that_hold_are_filled_in_the_film_of_a_card(found):
     hollow = re.findall(r'attributeName="stroke-opacity"[^>]*values="([^"]+)"', found._repr_html_())
     drawn = [each.split(";") for each in hollow]
     np.testing.assert_array_equal(drawn, np.where(np.tile(held, 2), "0", "1"))
+    shares = found.holding(found.sample(np.arange(2000) / 2000)).mean(axis=1)
+    assert summary_dict(found, None, None, None)["feet_hold"] == pytest.approx(shares)
     colours = re.findall('stroke="(#.{6})" stroke-width="8"', found._repr_html_())
     assert colours == ["#d55e00", "#009e73", "#d55e00"]  # a wheel is green
 
@@ -375,12 +380,6 @@ def test_sliders_of_the_page_say_and_draw_what_their_wave_does(page):
     bends = np.angle(np.diff(links)[1:] / np.diff(links)[:-1])
     np.testing.assert_allclose(bends, wave.angles(np.zeros(1))[:, 0])
     assert (head, centre) == pytest.approx((links[-1], np.convolve(links, [1, 2, 2, 1])[3] / 6))
-
-
-NO_SLIDERS = {
-    "nine": (Fourier(np.zeros(8), np.full((8, 1), 0.1), np.eye(8, 1)), Chain((1 / 9,) * 9)),
-    "feet": (ellipse(0.0, 1.0, 1.0), Chain((1 / 3,) * 3, feet=1), Friction(), Harmonic(1)),
-}
 
 
 @pytest.mark.parametrize("name", slow_but(["feet"], NO_SLIDERS))

@@ -62,7 +62,7 @@ READ = {
         "STUDY = Study('none', (Axis('mu_t', (1, 2)),), lambda mu_t: Problem('no', delta=-mu_t))\n"
     ),
 }
-NAMES = "time_s,joint_1,joint_2,x_m,y_m"
+NAMES = "time_s,joint_1,joint_2,x_mm,y_cm"
 ALSO = {}
 
 
@@ -309,7 +309,8 @@ def folder(tmp_path_factory):
     for name, text in READ.items():
         (made / name).write_text(text, encoding="utf-8")
     time = np.arange(41) / 10
-    angles = [*np.degrees(LOOP.angles(time / 4)), *(2 * state("loop").sample(time / 4).centre)]
+    path = state("loop").sample(time / 4).centre
+    angles = [*np.degrees(LOOP.angles(time / 4)), *np.multiply([[2e3], [2e2]], path)]
     digits = "%.2f,%.4f,%.4f,%.6f,%.6f"
     np.savetxt(made / "crawls.csv", np.transpose([time, *angles]), digits, header=NAMES)
     found = archive(made / "starts.h5")

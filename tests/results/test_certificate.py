@@ -18,6 +18,7 @@ from colloc.verification import replay as replay_module
 from tests.shared.cases import slow, slow_but
 
 JUST_BELOW, JUST_ABOVE = 0.95, 1.05
+LONG = map(slow, ("small_gaits", "four_link", "five_link"))
 
 
 @pytest.fixture(scope="module")
@@ -219,9 +220,6 @@ def test_the_replay_is_as_accurate_as_was_asked_for(three_link, tmp_path, capsys
     assert recheck([str(file), "--tolerance", "1e-9"]) == 0
     assert recheck([str(file), "--tolerance", "1e-15"]) == 4
     assert "NOT VERIFIED" in capsys.readouterr().out
-
-
-LONG = map(slow, ("small_gaits", "four_link", "five_link"))
 
 
 @pytest.mark.parametrize("name", ["two_link", "three_link", *LONG])

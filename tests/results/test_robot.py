@@ -13,7 +13,7 @@ import colloc
 from colloc import Fourier, Friction, Harmonic, Objective, Problem, ProblemError, evaluate, solve
 from colloc.gaits.objective import DRIVEN
 from colloc.results.motion import arc
-from colloc.results.robot import RobotSheet, in_si
+from colloc.results.robot import RobotSheet, in_si, limit_shares
 from colloc.studies.families import ParetoFront
 from colloc.verification.trajectory import plan_trajectory
 from tests.shared.mechanics import with_inertia
@@ -72,13 +72,15 @@ def test_work_over_a_period_is_the_mean_power_and_moves_the_body_its_way(three_l
     assert facts["cost_of_transport"] == pytest.approx(cost, rel=1e-4)
     speeds = np.diff(columns["joint_angles"].values) / np.diff(seconds)
     assert facts["peak_speed_rad_per_s"] == pytest.approx(np.abs(speeds).max(axis=1), rel=1e-4)
+    data = robot.to_xarray()
+    assert (data.joint_powers.attrs["units"], data.attrs["mass_kg"]) == ("W", 3)
 
 
 def test_how_numbers_grow_with_size_mass_gravity_and_pace(three_link, robot):
     """At one Froude number the pace is in speeds and powers alone."""
     other = three_link.robot(length=2.4, mass=6, period=10, gravity=9.81 / 2).facts
     growth = {"work_per_period_J": 2, "mean_power_W": 1, "speed_m_per_s": 1, "froude_number": 1}
-    growth |= {"peak_torque_N_m": 2, "rms_speed_rad_per_s": 0.5}
+    growth |= {"peak_torque_N_m": 2, "rms_speed_rad_per_s": 0.5, "slow_enough_period_s": 2}
     for name, factor in growth.items():
         assert other[name] == pytest.approx(factor * np.array(robot.facts[name])), name
     slow = three_link.robot(**SLOW).facts["cost_of_transport"]
@@ -171,8 +173,10 @@ def test_at_the_pace_that_is_slow_enough_inertia_takes_one_percent(three_link, r
 def test_of_a_gait_that_turns_so_slowly_that_inertia_does_nothing_no_rotation_is_its_doing():
     gait = Fourier([1.0, 1.1], [[-1.0], [0.7]], [[1.0], [0.9]])
     turns = evaluate(Problem("turns", delta=3e-2, mesh_tolerance=1e-2), gait)
-    facts = turns.robot(**SLOW).facts
+    robot, facts = (slow := turns.robot(**SLOW)).columns, slow.facts
     assert abs(turns.rotation) > 0.3
+    motion = turns.sample(robot["t"].values / SLOW["period"])
+    np.testing.assert_allclose(robot["centre"].values, 1.2 * motion.centre, atol=1e-4)
     assert facts["rotation_by_inertia_rad"] == pytest.approx(0.0, abs=1e-4)
     assert facts["inertia_takes"] == pytest.approx(0.0, abs=1e-4)
 
@@ -195,6 +199,9 @@ def test_peak_power_of_a_joint_is_the_most_it_drives_with_not_the_most_it_brakes
     for name, values in (("rms_torque_N_m", torques), ("rms_speed_rad_per_s", speeds)):
         rms = np.sqrt((values[:, :-1] ** 2).mean(axis=1))
         assert robot.facts[name] == pytest.approx(rms)
+    limited = replace(braking, problem=braking.problem.with_(torque_limit=0.5))
+    most = max(robot.facts["peak_torque_N_m"]) / robot.torque_unit
+    assert limit_shares(limited)["torque"] == pytest.approx(most / 0.5, rel=1e-3)
 
 
 def test_powers_of_an_exported_motion_are_negative_where_a_joint_brakes(braking, tmp_path):

@@ -29,6 +29,8 @@ from tests.shared.stages import program_of
 ONE = PathLimits(torque_and_power((1.0, 1.0), (1.0, 1.0)))
 BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 USUAL = Problem("limited", colloc.ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"))
+EASY = Friction(mu_t=3, mu_f=1, mu_b=1)
+ONE_SIDED = ((-0.6, 1.5), (-1.5, 0.6))
 
 
 def moments(body, law, angles, rates, delta):
@@ -295,10 +297,6 @@ def test_a_flat_top_that_the_second_round_comes_back_to_is_no_end():
     asked = {"speed_limit": (7, 11), "objective": "distance"}
     stated = Problem("flat", gait=Harmonic(2), delta=1e-2, mesh_tolerance=1e-3, **asked)
     assert colloc.solve(stated, starts=1).status == "solved"
-
-
-EASY = Friction(mu_t=3, mu_f=1, mu_b=1)
-ONE_SIDED = ((-0.6, 1.5), (-1.5, 0.6))
 
 
 def problem(joint_limit, gait=None, **changes):

@@ -14,6 +14,9 @@ from colloc.search.evaluate import with_motors
 GAIT = colloc.Fourier([0.2, -0.1], [[0.9, 0.1], [0.3, 0.0]], [[0.0, 0.1], [0.8, -0.1]])
 PROBLEM = colloc.Problem("mine", delta=1e-3)
 T = np.arange(60) / 60
+LINKS = (0.3, 0.45, 0.25)
+QUICK = PROBLEM.with_(delta=3e-3, mesh_tolerance=1e-3)
+N = 40
 
 
 @pytest.fixture(scope="module")
@@ -44,9 +47,6 @@ def test_delta_at_unit_shape_speed_becomes_that_of_the_gait_in_a_period():
     stated, _ = with_motors(PROBLEM.with_(gait=colloc.Polygon(4)), GAIT)
     speed = np.sqrt((GAIT.rates(T) ** 2).sum(axis=0).mean())
     assert stated.delta == pytest.approx(1e-3 * speed)
-
-
-LINKS = (0.3, 0.45, 0.25)
 
 
 def filmed(path, time, lengths=LINKS, names="x_{} y_{}", sway=0.0):
@@ -193,10 +193,6 @@ def test_a_gait_is_certified_in_whatever_is_asked_of_it(objective, mu):
     solution = colloc.evaluate(PROBLEM.with_(**asked), GAIT)
     assert solution.status == "solved"
     assert solution.answer.value == pytest.approx(solution.value, rel=1e-4)
-
-
-QUICK = PROBLEM.with_(delta=3e-3, mesh_tolerance=1e-3)
-N = 40
 
 
 @pytest.fixture(scope="module")

@@ -20,6 +20,9 @@ from tests.shared.mechanics import with_inertia
 
 ROUND, STANDING_POWER = colloc.ellipse(A0=0, A1=2.2, B1=1.3), "distance / (work + 0.1 * period)"
 SKATING = colloc.Fourier(mean=[2.7, -2.7], cos=[[0.4], [0.0]], sin=[[0.0], [0.3]])
+LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[1.17], [0.12]], sin=[[0.0], [-0.91]], theta=0.7)
+BODY, FRICTION = colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
+DELTA = 1e-2
 
 
 def problem(froude, **fields):
@@ -107,11 +110,6 @@ def test_speed_under_a_limit_of_power_takes_all_of_it():
     assert limited.optimal
     assert period["work"] / period["period"] == pytest.approx(0.1, rel=1e-6)
     assert 0.001 < played(limited) < 1.0
-
-
-LEANING = colloc.Fourier(mean=[0.3, -0.5], cos=[[1.17], [0.12]], sin=[[0.0], [-0.91]], theta=0.7)
-BODY, FRICTION = colloc.Chain((0.3, 0.45, 0.25)), colloc.Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
-DELTA = 1e-2
 
 
 def uphill(**fields):

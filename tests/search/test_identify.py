@@ -128,10 +128,11 @@ def test_directions_of_head_and_tail_alone_tell_coefficients_too(crawled, tmp_pa
     head = "time_s,joint_1,joint_2,yaw_deg,head_theta_deg"
     both = np.column_stack([columns[0], columns[1][:, -1]])
     np.savetxt(path, both, "%.9g", ",", header=head, comments="")
-    found = colloc.identify(FLOOR, path)
+    stated = FLOOR.with_(robot=Robot(length=0.6, mass=1, period=900))
+    found = colloc.identify(stated, path, length=2)
     assert found.problem.friction.mu_t == pytest.approx(TRUE.mu_t, rel=1e-3)
     assert found.problem.friction.mu_b == pytest.approx(TRUE.mu_b, rel=1e-3)
-    assert "path of headings in body lengths" in found.message
+    assert "path of headings in body lengths of 2 m" in found.message
 
 
 def test_markers_at_ends_and_joints_tell_angles_and_path_of_the_centre_of_mass(tmp_path):

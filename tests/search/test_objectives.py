@@ -13,7 +13,7 @@ import pytest
 import colloc
 from colloc import Fourier, Friction, Harmonic, Objective, Problem, ellipse, replay
 from colloc.commands.results import verify
-from colloc.commands.solve import summary_lines
+from colloc.commands.solve import summary_dict, summary_lines
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.gait_fields import statement_hash
 from colloc.gaits.objective import DRIVEN, EFFICIENCY, NAMED, QUANTITIES, SPEED, TURNING
@@ -24,6 +24,9 @@ from colloc.search.solve import solve
 from tests.shared.mechanics import coulomb
 
 SKEW = Fourier([0.5, 0.5], [[1.0], [0.2]], [[0.0], [1.0]])
+SLIPPERY = {"gait": Harmonic(1, "bilateral"), "delta": 1e-2, "friction": Friction(0.3, 0.3, 0.3)}
+PERIOD = dict(zip(QUANTITIES, (0.31, 1.3, 0.7, 8.0, 1.5, 3.0), strict=True))
+EXPRESSIONS = [*NAMED, "distance / (work + 0.1 * length)", "2 * distance - 0.01 * work**2"]
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +57,7 @@ def test_a_result_says_what_it_is_best_at_and_comes_back_from_its_file(fast, tmp
     assert again.value == fast.value
     assert again.certificate == fast.certificate
     assert "d/L = 0.014" in repr(again)
+    assert again.to_xarray(np.zeros(1)).attrs["value"] == fast.value
     assert verify([str(tmp_path / "fast.h5")]) == 0
     assert "speed d/L" in capsys.readouterr().out
 
@@ -130,9 +134,6 @@ def test_every_joint_has_a_limit_of_its_own():
     assert values[0] == values[1]
 
 
-SLIPPERY = {"gait": Harmonic(1, "bilateral"), "delta": 1e-2, "friction": Friction(0.3, 0.3, 0.3)}
-
-
 @pytest.mark.slow
 def test_where_the_farthest_gait_goes_less_half_of_its_distance_is_asked_for():
     problem = Problem("stiff", body=colloc.Chain((0.2, 0.6, 0.2)), least_distance=0.1, **SLIPPERY)
@@ -161,6 +162,7 @@ def test_the_first_line_of_a_gait_that_nobody_sees_says_so(three_link):
     problem = Problem("twitch", ellipse(0, 0.06, 0.05), smallest_shape_speed=0.02, **SLIPPERY)
     solution = colloc.evaluate(problem, problem.guess)
     assert solution.is_tiny
+    assert summary_dict(solution, None, None, None)["tiny"]
     assert "tiny gait" in summary_lines(solution, None)[0]
     one_moves = colloc.Fourier([0.0, 0.0], [[1.0], [0.01]], [[0.0], [0.01]])
     seen = replace(three_link, answer=replace(three_link.answer, gait=one_moves))
@@ -228,10 +230,6 @@ def test_a_pace_counts_by_its_ratio_to_friction():
     assert unit["distance"] > 1e-3
     assert light["distance"] == pytest.approx(unit["distance"], rel=1e-9)
     assert light["work"] == pytest.approx(0.1 * unit["work"], rel=1e-9)
-
-
-PERIOD = dict(zip(QUANTITIES, (0.31, 1.3, 0.7, 8.0, 1.5, 3.0), strict=True))
-EXPRESSIONS = [*NAMED, "distance / (work + 0.1 * length)", "2 * distance - 0.01 * work**2"]
 
 
 @pytest.mark.parametrize("text", EXPRESSIONS)

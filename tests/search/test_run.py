@@ -37,6 +37,19 @@ FILE = """
 from colloc import *
 PROBLEM = Problem("quick", gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=2, mu_f=1, mu_b=1.4), delta=1e-3)
 """
+SERIES = colloc.Fourier([0.2, 0.0, -0.1], [[1.0], [0.2], [-0.8]], [[0.3], [1.1], [0.5]])
+WIDE = ellipse(1.0, 0.7, 1.1)
+PROBLEMS = [
+    QUICK,
+    Problem("series", SERIES, Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1), **AT),
+    Problem("spline", WIDE, gait=BSpline(8, symmetry="bilateral"), **AT),
+    Problem("sides", WIDE, gait=Polygon(4, "bilateral"), **AT | {"intervals": 24}),
+    QUICK.with_(name="uphill", guess=ellipse(0, 2.8, 1.3), grade=0.1, delta_start=None),
+    Problem(
+        "modes", None, ModalBody(2, panels=4), gait=Harmonic(1, "antipodal"), **AT | {"delta": 0.1}
+    ),
+]
+PROBLEM = Problem("quick", gait=Harmonic(1, "none"), **AT)
 
 
 @pytest.fixture(scope="module")
@@ -146,6 +159,9 @@ def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_b
         assert chosen.shrunk.answer is small.answer
         assert "A tiny gait is better still" in chosen.message
     assert choose(found.problem, [small]).answer is small.answer
+    failed = replace(found, answer=replace(found.answer, value=9.0, optimal=False), message="why")
+    said = choose(found.problem, [failed, found]).message
+    assert "A gait of 9.0000 is not verified: why" in said
 
 
 def stage(number):
@@ -163,20 +179,6 @@ def test_a_kept_value_that_was_damaged_is_found_anew(tmp_path):
         again = Run(path, QUICK)
         assert again.result(stage, (1,))[1] == QUICK
         assert again.n_reused == 0
-
-
-SERIES = colloc.Fourier([0.2, 0.0, -0.1], [[1.0], [0.2], [-0.8]], [[0.3], [1.1], [0.5]])
-WIDE = ellipse(1.0, 0.7, 1.1)
-PROBLEMS = [
-    QUICK,
-    Problem("series", SERIES, Chain((0.3, 0.2, 0.2, 0.3)), gait=Harmonic(1), **AT),
-    Problem("spline", WIDE, gait=BSpline(8, symmetry="bilateral"), **AT),
-    Problem("sides", WIDE, gait=Polygon(4, "bilateral"), **AT | {"intervals": 24}),
-    QUICK.with_(name="uphill", guess=ellipse(0, 2.8, 1.3), grade=0.1, delta_start=None),
-    Problem(
-        "modes", None, ModalBody(2, panels=4), gait=Harmonic(1, "antipodal"), **AT | {"delta": 0.1}
-    ),
-]
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
@@ -308,9 +310,6 @@ def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess(
     assert best.value == seen[-1].value > 1.5 * first.value
     assert best.message.startswith("interrupted; this is the best gait so far.")
     assert solve(QUICK, 1).status != "interrupted"  # it is over then
-
-
-PROBLEM = Problem("quick", gait=Harmonic(1, "none"), **AT)
 
 
 @pytest.fixture

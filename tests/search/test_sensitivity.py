@@ -149,7 +149,7 @@ def test_the_gait_on_file_falls_behind_to_second_order(three_link, of):
     assert 0 < 4 * behind[0] == pytest.approx(behind[1], rel=0.1)
 
 
-def test_a_path_on_file_is_replayed_at_delta_at_unit_shape_speed_and_for_its_turn(of):
+def test_a_path_on_file_is_replayed_at_delta_at_unit_shape_speed_and_for_its_turn(of, monkeypatch):
     """Per period it is ten times that here, and what counts is the chord."""
     of("friction sideways")
     at = {"rotation": 0.3, "delta": 4e-4, "mesh_tolerance": 1e-2, "gait": colloc.Polygon(4)}
@@ -157,6 +157,9 @@ def test_a_path_on_file_is_replayed_at_delta_at_unit_shape_speed_and_for_its_tur
     found = sensitivity(polygon, resolve=True, change=1e-3)["friction sideways"].again
     assert [each.kept for each in found] == pytest.approx([each.value for each in found], rel=1e-4)
     assert not any(each.breaks for each in found)
+    monkeypatch.setattr("colloc.search.sensitivity.finish", lambda *at: polygon)
+    less = _again(polygon, polygon.problem.with_(rotation=0.28), 0.1)
+    assert less.breaks == "turns +1.1° too far per cycle"
 
 
 def test_a_gait_that_exceeds_a_limit_or_turns_says_so(three_link, of):

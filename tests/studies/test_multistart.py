@@ -39,6 +39,8 @@ from colloc import *
 PROBLEM = Problem(name="quick", gait=Harmonic(1, "bilateral"), guess=ellipse(0.2, 1.2, 0.8),
                   friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=0.1, intervals=10, mesh_tolerance=1e-3)
 """
+SPLINE = BSpline(6).member(np.linspace(0.1, 1.3, 12) ** 2, 2)
+CORNERS = colloc.Corners([[0.1, 1.3, 1 / 3], [0.0, 0.2, 0.9]])
 
 
 def problem(**changes):
@@ -143,10 +145,6 @@ def test_basins_join_images_of_one_gait_and_nothing_else():
     assert archives.counts([*same, failed]) == {SOLVED: 8, ERROR: 1}
 
 
-SPLINE = BSpline(6).member(np.linspace(0.1, 1.3, 12) ** 2, 2)
-CORNERS = colloc.Corners([[0.1, 1.3, 1 / 3], [0.0, 0.2, 0.9]])
-
-
 @pytest.mark.parametrize(
     ("kind", "gait"), [(Harmonic(2), GAIT), (BSpline(6), SPLINE), (colloc.Polygon(3), CORNERS)]
 )
@@ -248,8 +246,9 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
         assert settings == {"sampler": SAMPLERS[0], "workers": 3, "time_limit": 7.0}
         for k in numbers:
             asked.append(k)
-            archive.add({name(k, seed): outcome(k, gait=ROUND)})
-            yield outcome(k, gait=ROUND)
+            ended = outcome(k, 0.2 + 0.01 * k, gait=ROUND)
+            archive.add({name(k, seed): ended})
+            yield ended
 
     assert "0 starts done already, 2 to go" in run("--starts", 2)[1]
     assert sorted(kept().of_search(SAMPLERS[0], 0)) == [0, 1]
@@ -264,7 +263,8 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     # another seed joins the same archive, and says what else is there
     code, said, _ = run("--starts", 2, "--seed", 1)
     assert (code, asked) == (0, [2, 3, 0, 1])
-    assert "other starts in the file: 4; the best of all, 0.200000" in said
+    assert "--start 1 --seed 1   makes a result of the best" in said
+    assert "other starts in the file: 4; the best of all, 0.230000, is start 3 of seed 0" in said
     assert sorted(kept().of_search(SAMPLERS[0], 0)) == [0, 1, 2, 3]
     assert sorted(kept().of_search(SAMPLERS[0], 1)) == [0, 1]
     # another problem of the same name does not

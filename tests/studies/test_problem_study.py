@@ -41,6 +41,11 @@ def problem(mu_t, mu_b):
 STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1)), Axis("mu_b", (1.0,))), problem, cold_starts=0)
 """
 START = ellipse(0.0, 1.2, 0.4)
+CLASSES = {
+    "ellipse": Harmonic(1, "bilateral"),
+    "triangle": colloc.Polygon(3, "bilateral"),
+    "spline": colloc.BSpline(8, symmetry="bilateral"),
+}
 
 
 def problem(x=1.0, y=1.0, kind="a"):
@@ -369,13 +374,6 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
     back = load_study(path)
     np.testing.assert_array_equal(back.variables["efficiency"], table.variables["efficiency"])
     assert back.dimensions["mean"] == ("x", "kind", "joint")
-
-
-CLASSES = {
-    "ellipse": Harmonic(1, "bilateral"),
-    "triangle": colloc.Polygon(3, "bilateral"),
-    "spline": colloc.BSpline(8, symmetry="bilateral"),
-}
 
 
 def in_class(kind, guess=ellipse(0.1, 2.0, 1.0), intervals=20):  # noqa: B008

@@ -16,6 +16,9 @@ from colloc.system.row_file import CACHE, put_rows, read_rows
 from colloc.system.store_file import array, attribute, mark, new_file, open_file, put, put_attribute
 
 KIND = "colloc test 1"
+CHARACTERS = st.characters(exclude_categories=["Cs"])
+FIXTURES = [HealthCheck.function_scoped_fixture]
+NUMBERS = True, 3, -2.5, [1.0, np.nan], [[1, 2]], [True, False], np.zeros((0, 2)), np.float32(0.5)
 
 
 def test_rows_come_back_as_they_were_in_the_order_in_which_their_keys_came(tmp_path):
@@ -112,18 +115,11 @@ def returned(path, value):
         return array(file, "value"), attribute(file, "value")
 
 
-CHARACTERS = st.characters(exclude_categories=["Cs"])
-FIXTURES = [HealthCheck.function_scoped_fixture]
-
-
 @settings(max_examples=50, deadline=None, derandomize=True, suppress_health_check=FIXTURES)
 @given(st.lists(st.text(CHARACTERS, max_size=20), max_size=5))
 def test_lists_of_texts_round_trip_but_for_trailing_nuls(tmp_path, values):
     for found in returned(tmp_path / "x.h5", np.array(values, dtype=object)):
         assert found.tolist() == [value.rstrip("\0") for value in values]
-
-
-NUMBERS = True, 3, -2.5, [1.0, np.nan], [[1, 2]], [True, False], np.zeros((0, 2)), np.float32(0.5)
 
 
 @pytest.mark.parametrize("value", [*TEXTS, *NUMBERS])

@@ -15,6 +15,11 @@ import pytest
 
 from colloc.system.task_pool import Lost, Task, pool_for, process_pool, run_tasks
 
+UNGUARDED = {
+    "colloc's": "import colloc\nfrom operator import neg as task",
+    "its own": "def task(x):\n    return -x",
+}
+
 
 def listed(tasks):
     waiting = iter(tasks)
@@ -64,12 +69,6 @@ def test_blas_threads_do_not_multiply_with_processes(monkeypatch):
     # the main thread, the one that watches the parent, and the queue's feeder if it has started
     assert count <= 3
     assert os.environ["OPENBLAS_NUM_THREADS"] == "4"
-
-
-UNGUARDED = {
-    "colloc's": "import colloc\nfrom operator import neg as task",
-    "its own": "def task(x):\n    return -x",
-}
 
 
 @pytest.mark.parametrize("whose", UNGUARDED)

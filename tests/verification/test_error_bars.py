@@ -24,6 +24,10 @@ RECORDED = [
 ]
 QUANTITIES = "efficiency", "distance", "work", "limit"
 FIXED = [entry for entry in RECORDED if entry["row"] is not None][:4]
+LEANING = Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
+
+
+ONCE = [("motion", 2, 6), ("slope", 1, 45), ("motion", 1, 17), ("motion", 2, 18), ("slope", 1, 57)]
 
 
 def test_the_other_program_has_the_forces_of_the_integral_table_in_sixty_digits():
@@ -61,12 +65,6 @@ def test_what_is_recorded_is_what_the_other_program_finds(number):
     found = compared(int(entry["name"].split("-")[1]))
     for name in QUANTITIES:
         assert found[name][2] == pytest.approx(entry["row"][name][2], rel=1e-7)
-
-
-LEANING = Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
-
-
-ONCE = [("motion", 2, 6), ("slope", 1, 45), ("motion", 1, 17), ("motion", 2, 18), ("slope", 1, 57)]
 
 
 @pytest.mark.parametrize(("play", "seed", "number"), slow_but(ONCE[:2], ONCE))

@@ -23,6 +23,8 @@ GAIT = ellipse(0, 2.8, 1.25)
 DELTA = 1e-3
 UNEQUAL = Friction(mu_t=1.7, mu_f=1, mu_b=1.3)
 each_friction = pytest.mark.parametrize("friction", [Friction(), UNEQUAL], ids=str)
+NONE = np.zeros((2, 1))
+FOLDED = Fourier([2.0, 2.0], [[0.3], [0.3]], NONE), Fourier([-2.0, 0.0], [[1.4], [0.0]], NONE)
 
 
 def problem(name="gauss-3", friction=None, **changes):
@@ -249,10 +251,6 @@ def test_a_refined_solution_knows_its_scheme_and_its_error():
     gait = answer.gait
     known = replay(stated.body, stated.friction, gait, DELTA, tolerance=1e-8)
     assert abs(answer.efficiency / known.efficiency - 1) < 1e-5
-
-
-NONE = np.zeros((2, 1))
-FOLDED = Fourier([2.0, 2.0], [[0.3], [0.3]], NONE), Fourier([-2.0, 0.0], [[1.4], [0.0]], NONE)
 
 
 @pytest.mark.parametrize("wide", [GAIT.scaled(1.2), *FOLDED])

@@ -16,6 +16,9 @@ from tests.conftest import ROOT
 from tests.shared.mechanics import coulomb
 
 LAWS = [(1.0, 1.0, 1.0), (1.7, 1.0, 1.3), (1.0, 1.0, 3.0), (10.0, 1.0, 1.0)]
+WORK = 2
+AUDIT = (ROOT / "results/curated/audit.jsonl").read_text(encoding="utf-8")
+OPTIMA = {row["number"]: row for row in map(json.loads, AUDIT.splitlines())}
 
 
 def random_path(seed):
@@ -126,9 +129,6 @@ def test_the_best_polygon_that_is_known_is_replayed_at_its_value():
     assert crossing_depth(Chain(), gait.angles(np.linspace(0, 1, 20001))).max() == 0
 
 
-WORK = 2
-
-
 def at_rest(power):
     """Values at instants of a body that rests and does work: z, rates, power of joints, spread."""
     none = 0.0 * power
@@ -224,10 +224,6 @@ def test_changes_are_those_of_the_distance_when_one_panel_is_halved(steady):
         turn[k], move[k] = once[0][k], once[1][k]
         change, rel = abs(distance(turn, move) - distance(*twice[:2])), 3e-2 if steady else 1e-3
         assert changes(panels)[0][k, 1] == pytest.approx(change, rel=rel, abs=1e-9)
-
-
-AUDIT = (ROOT / "results/curated/audit.jsonl").read_text(encoding="utf-8")
-OPTIMA = {row["number"]: row for row in map(json.loads, AUDIT.splitlines())}
 
 
 @pytest.mark.parametrize("number", [35, 94, 162, 209, 558, 893])
