@@ -316,7 +316,7 @@ def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, s
         for row in table.cells:
             text = row[column.at].replace(",", ".")
             if re.match(r"\d{1,2}:", text):  # a time of day
-                text = f"2000-01-01 {text:0>8}"
+                text = f"2000-01-01 {'0' * (text[1] == ':')}{text}"
             try:
                 stamps.append(datetime.fromisoformat(text).timestamp())
             except ValueError:

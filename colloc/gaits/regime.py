@@ -208,11 +208,6 @@ class Regime:
                 "searches with inertia are for chains whose joints all have motors: leave froude "
                 "or gears and stuck joints out."
             )
-        if not gaits.free:
-            raise ProblemError(
-                "a prescribed motion is played with inertia by colloc.replay(..., froude=...): "
-                "leave froude out of the problem."
-            )
         if not gaits.relative_delta and gaits.symmetry not in (NONE, ANTIPODAL):
             raise ProblemError(
                 f"gaits of symmetry {gaits.symmetry} run backwards in half of each cycle, as "

@@ -233,8 +233,7 @@ def test_a_potential_is_checked_by_samples_that_were_not_chosen_for_it(found):
     free, how = np.array(bound.coefficients), {"shapes": 20, "directions": 48, "starts": 100}
     values = [largest_ratio(*at, free, seed=seed, **how)[0] for seed in (1, 2)]
     assert values[0] == pytest.approx(values[1], abs=2e-3)
-    # four rounds were too few: what they missed shows
-    assert min(values) > bound.floor
+    assert min(values) > bound.floor  # four rounds were too few: what they missed shows
     # another potential is worse
     assert largest_ratio(*at, 0.5 * free, **how)[0] > max(values) + 0.1
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from colloc import Chain, Friction, Harmonic, Problem, ProblemError, ellipse, load, save
+from colloc import Chain, Friction, Harmonic, Problem, ellipse, load, save
 from colloc.dynamics.dynamics import QuasiStatic, Trajectory
 from colloc.gaits import gait_fields
 from colloc.gaits.objective import EFFICIENCY
@@ -130,9 +130,6 @@ def test_a_kind_of_motion_in_one_file_is_solved_certified_kept_and_read(monkeypa
     read = load(save(found, tmp_path / "pushed.h5"))
     assert (read.problem.motion, read.certificate) == (Pushed(0.1), found.certificate)
     assert read.problem.hash == PROBLEM.hash != PROBLEM.with_(motion=None).hash
-    for other in ({"grade": 0.1}, {"froude": 0.1}):
-        with pytest.raises(ProblemError, match="takes the place of grade and froude"):
-            PROBLEM.with_(**other)
 
 
 def test_without_a_push_it_is_the_motion_on_the_level():

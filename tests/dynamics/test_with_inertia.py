@@ -89,7 +89,6 @@ def test_shooting_and_collocation_find_the_same_motion(froude):
     along = kind.simulate(mesh, Shapes(*gait(mesh.times), 1e-2), np.empty(0))
     at = stated.body, stated.law, *gait(mesh.times), along.states
     gained = kind.equations(mesh).integrals(momentum_rates(*at, delta=1e-2, froude=froude).rates)[0]
-    # Newton's last step leaves rounding alone
     np.testing.assert_allclose(along.states, along.edges[:, :1] + gained, rtol=0, atol=1e-13)
     shot_there = [np.interp(mesh.edges, shot.tail[0], each) for each in shot.states[:3]]
     np.testing.assert_allclose(along.edges, shot_there, atol=1e-3 * np.abs(shot.states[:3]).max())
@@ -226,7 +225,7 @@ def test_what_a_gait_that_turns_is_worth_slowly_is_the_limit_of_slow_paces():
     assert found.played_slowly == pytest.approx(found.value, rel=1e-3)
 
 
-def test_a_body_that_begins_at_rest_comes_to_move_as_certified(paced):
+def test_a_body_with_inertia_that_begins_at_rest_comes_to_move_as_certified(paced, three_link):
     found, moved = paced, paced.from_rest(np.arange(0.0, 6.501, 0.01))
     ways = np.hypot(*np.diff(moved.centre[:, ::100], axis=1))
     assert np.hypot(*(moved.centre[:, 1] - moved.centre[:, 0])) < 1e-3
@@ -235,9 +234,6 @@ def test_a_body_that_begins_at_rest_comes_to_move_as_certified(paced):
     settled, alike = moved.z[:, 550:], found.sample(moved.t[550:]).z
     np.testing.assert_allclose(settled, alike, atol=2e-2)
     assert len(list(pictures(found, 2, 2, width=200, from_rest=True))) == 4
-
-
-def test_without_inertia_no_body_begins_at_rest(three_link):
     with pytest.raises(colloc.ProblemError, match="has no inertia"):
         three_link.from_rest(np.zeros(1))
 
@@ -267,7 +263,6 @@ def test_two_equal_links_go_nowhere_by_an_antipodal_gait():
     gait = colloc.Fourier(mean=[0.0], cos=[[1.1, 0.0, 0.3]], sin=[[0.0, 0.0, 0.4]])
 
     def distance(body):
-        # no error is small beside no distance
         how = {"tolerance": 1e-4, "objective": objective_from("distance + work")}
         return colloc.replay(body, colloc.Friction(mu_t=2), gait, 1e-2, froude=0.1, **how).distance
 

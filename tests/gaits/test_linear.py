@@ -89,6 +89,15 @@ def test_what_a_class_says_of_its_parameters_is_true_of_its_gaits(gait_class, bo
     assert 4 * gait_class.harmonics <= points < max(4 * gait_class.harmonics + 3, 7)
 
 
+def test_random_splines_are_smooth_waves_and_a_hop_leaves_finer_features_as_they_are():
+    kind, rng = BSpline(24), np.random.default_rng(4)
+    unit, gait = rng.uniform(size=kind.sample_dimension(2)), member(kind)
+    np.testing.assert_array_equal(kind.sample(unit, 2).table, Harmonic(3).sample(unit, 2).table)
+    hops = [kind.perturb(gait, 0.1, 1, rng).angles(T)[1] - gait.angles(T)[1] for _ in range(300)]
+    powers = np.mean(np.abs(2 * np.fft.rfft(hops) / T.size) ** 2, axis=0) / 2
+    np.testing.assert_allclose(powers[1:5] ** 0.5, [0.1, 0.05, 0.1 / 3, 0], rtol=0.1, atol=1e-12)
+
+
 @pytest.mark.parametrize("gait_class", [Basis(FOUR, "antipodal"), Basis(ELLIPSES)])
 def test_random_combinations_of_columns_are_drawn_about_rest_each_up_to_a_radian(gait_class):
     unit = np.random.default_rng(5).uniform(size=gait_class.sample_dimension(2))
@@ -122,8 +131,7 @@ def test_a_symmetry_halves_the_parameters_and_starts_of_many_knots_have_three_ha
     assert [Basis(FOUR, symmetry=s).size(2) for s in SYMMETRIES] == [8, 4, 4]
     # cos x - cos(3 x) / 6 keeps within so much
     assert Harmonic(3).bounds(Chain(), 3**0.5 / 2)[1].min() > 1
-    # a joint may rest in a column
-    assert Basis([np.stack([COS, np.ones(96)])]).size(2) == 1
+    assert Basis([np.stack([COS, np.ones(96)])]).size(2) == 1  # a joint may rest in a column
     smooth = [Harmonic(n).sample_dimension(2) for n in (2, 3, 3)]
     assert [BSpline(knots).sample_dimension(2) for knots in (5, 12, 64)] == smooth
 
@@ -225,12 +233,6 @@ def random_gait(seed, n_joint=3, harmonics=3):
     return Fourier(rng.normal(size=n_joint), *rng.normal(size=(2, n_joint, harmonics)))
 
 
-def test_rates_are_the_derivative_of_angles():
-    gait, h = random_gait(1), 1e-6
-    slope = (gait.angles(T + h) - gait.angles(T - h)) / (2 * h)
-    np.testing.assert_allclose(slope, gait.rates(T), rtol=1e-6, atol=1e-6)
-
-
 @pytest.mark.parametrize("symmetry", ["none", "bilateral", "antipodal"])
 @pytest.mark.parametrize("n_joint", [1, 2, 3, 4])
 @pytest.mark.parametrize("harmonics", [1, 2, 3, 4])
@@ -249,8 +251,10 @@ def test_members_have_the_symmetry_and_last_harmonic_of_their_class(harmonics, n
         np.testing.assert_allclose(gait_class.parameters(gait), p, atol=1e-12)
 
 
-def test_the_free_start_phase_is_removed_without_changing_the_path():
-    gait = random_gait(4, 2, 2)
+def test_rates_are_the_derivative_and_the_free_start_phase_is_removed_without_changing_the_path():
+    gait, h = random_gait(4, 2, 2), 1e-6
+    slope = (gait.angles(T + h) - gait.angles(T - h)) / (2 * h)
+    np.testing.assert_allclose(slope, gait.rates(T), rtol=1e-6, atol=1e-6)
     member = Harmonic(2, "none").member(Harmonic(2, "none").parameters(gait), 2)
     phase = np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi)
     np.testing.assert_allclose(member.angles(T), gait.angles(T + phase), atol=1e-12)
@@ -278,6 +282,8 @@ def test_joints_follow_one_another_by_a_lag_and_a_member_has_its_parameters(gait
     np.testing.assert_allclose(gait_class.parameters(gait), v, atol=1e-14)
     told = Fourier(gait.mean, gait.cos, gait.sin)  # which does not know its lag
     np.testing.assert_allclose(gait_class.parameters(told), v, atol=1e-6)
+    later = gait_class.is_synchronous(shift_phase(told, 0.1))
+    assert (gait_class.is_synchronous(gait), later) == (True, gait_class.symmetry == "bilateral")
 
 
 def test_a_solved_one_is_certified_kept_and_no_better_than_all_harmonics(tmp_path):

@@ -68,6 +68,7 @@ def test_a_polygon_is_a_spline_of_degree_1_whose_pace_does_not_matter():
         kind = Polygon(6, symmetry)
         v, t = np.linspace(-1.0, 1.0, kind.size(2)) ** 3, np.linspace(0.0, 1.0, 101)
         gait, timed = kind.member(v, 2), kind.trajectory(v, 2)
+        np.testing.assert_allclose(kind.project(timed), v, atol=1e-12)
         assert kind.relative_delta
         assert not BSpline(6, 2).relative_delta
         # angles linear in the parameters at a program's times are those of the gait at its phases

@@ -57,6 +57,7 @@ READ = {
     "seconds and nanoseconds": ("stamp.sec,stamp.nanosec,q1,q2,q3\n" + table([f"{int(s) + 1000}" for s in SECONDS], [f"{round(s % 1 * 1e9)}" for s in SECONDS], A, B, C),
         "time in s"),
     "date and time": ("timestamp,joint_1,joint_2,joint_3\n" + table(STAMPS, A, B, C), "time of day, in s"),
+    "time of day": ("clock,q1,q2,q3\n" + table([s[11:-1].replace("12:", "9:", 1) for s in STAMPS], A, B, C), "time of day, in s"),
     "a period in seconds": ("# period_s: 4\nt_ms,q1,q2,q3\n" + table(1000 * SECONDS, A, B, C), "time in ms"),
     "no times": ("Servo1 Position,Servo2 Position,Servo3 Position\n" + table(A, B, C), "time in equal steps"),
     "counted samples, two dropped": ("seq,q1,q2,q3\n" + table(*(np.delete(each, [7, 30]) for each in (np.arange(60), A, B, C))),
@@ -123,6 +124,8 @@ REFUSED = {
     "two samples": ("t,a,b,c\n0,0,0,0\n1,1,0,0\n", "holds 2 samples"),
     "nothing": ("", "holds 0 samples"),
     "degrees without a word": ("t,a,b,c\n0,0,0,0\n1,90,0,0\n2,0,90,0\n5,0,0,0\n6,0,0,0\n7,0,0,0\n8,0,0,0\n", "an angle of 90 rad .*: if angles are degrees, say so"),
+    "another column": ("t,q1_deg,q2_deg,q3_deg\n" + table(SECONDS, *20 * DEGREES), "is it the right column"),
+    "no names, a joint less": (table(A, B), "it has 1 column of angles, and the body has 3 joints"),
     "another time": ("t,q1,q2,q3\n" + table([f"31.01. {k}h" for k in range(60)], A, B, C), "line 2: the time .* write seconds"),
     "one instant": (table(np.ones(60), A, B, C), "all times are 1"),
     "JSON": (b'{"time_s": [0, 1]}', "is no text of numbers"),
@@ -199,6 +202,13 @@ def test_a_long_log_is_read_in_seconds(tmp_path):
     assert time.process_time() - begin < 10
     np.testing.assert_allclose(found.gait.angles(T), ANGLES, atol=1e-5)
     assert "of 20000 rows, one in 4 taken" in found.describe()
+
+
+def test_of_a_long_log_rows_are_left_out_evenly(tmp_path, monkeypatch):
+    monkeypatch.setattr("colloc.gaits.record._MOST", 40)
+    found = read(tmp_path, "t,q1,q2,q3\n" + table(SECONDS, A, B, C))
+    assert "of 60 rows, one in 2 taken" in found.describe()
+    np.testing.assert_allclose(found.gait.angles(T), ANGLES, atol=1e-5)
 
 
 def test_joints_that_all_move_about_a_right_angle_are_hinted_at(tmp_path):

@@ -143,7 +143,6 @@ def test_a_figure_of_a_robot_has_its_units(slow_robot):
     np.testing.assert_allclose(speeds.lines[-1].get_ydata(), delta)
     assert "[cm]" in lab.get_xlabel()
     assert [axes.get_xlabel() for axes in (angles, speeds, power)] == 3 * ["time  [s]"]
-    # a label is the number of its place, in the other unit
     watt = 0.9 * 9.81 * 0.62 / 600
     of_angles, of_power = (angles.yaxis, np.degrees(1)), (power.yaxis, watt)
     for axis, unit in ((lab.xaxis, 62.0), of_angles, (power.xaxis, 600.0), of_power):

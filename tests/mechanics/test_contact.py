@@ -72,11 +72,6 @@ def test_the_gap_between_links_is_that_of_their_points():
         np.testing.assert_allclose(np.sqrt(w**2 - 2 * w * lacking), naive, atol=0.35 / 200)
 
 
-def test_two_links_cannot_cross():
-    assert not Chain((0.5, 0.5)).contacts()
-    assert np.array_equal(crossing_depth(Chain((0.5, 0.5)), np.array([[3.0, 0.0]])), [0.0, 0.0])
-
-
 def test_the_tangent_planes_of_the_minimum_lie_above_it_and_touch():
     rng = np.random.default_rng(2)
     first, second = rng.normal(size=(2, 500)) * 3 * touching.SMOOTHING
@@ -228,14 +223,15 @@ def test_a_joint_folds_until_the_free_end_lies_beside_its_neighbour(width):
     for shapes in (folded, -folded, folded[::-1]):
         assert np.array_equal(admissible(body, shapes), [True, False])
         assert np.array_equal(crossing_depth(body, shapes) > 0, [False, True])
-    # of unequal neighbours the shorter decides
-    uneven = Chain((0.5, 0.3, 0.2), width=width * 0.9)
+    uneven = Chain((0.5, 0.3, 0.2), width=width * 0.9)  # of unequal neighbours the shorter decides
     last = np.pi - np.arcsin(uneven.width / 0.3)
     beside = np.array([[last - 1e-6, last + 1e-6], [0.0, 0.0]])
     assert np.array_equal(crossing_depth(uneven, beside) > 0, [False, True])
 
 
-def test_without_a_width_nothing_is_different():
+def test_without_a_width_nothing_is_different_and_two_links_never_cross():
+    assert not Chain((0.5, 0.5)).contacts()
+    assert np.array_equal(crossing_depth(Chain((0.5, 0.5)), np.array([[3.0, 0.0]])), [0.0, 0.0])
     assert Problem("lines", body=Chain(width=0.0)).hash == Problem("lines").hash
     assert "width" not in Problem("lines").to_dict()["body"]
     assert len(Chain().contacts()) == 2

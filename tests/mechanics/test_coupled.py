@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import colloc
-from colloc import Chain, Coupled, Friction, Harmonic, Problem
+from colloc import Chain, Coupled, Friction, Harmonic, Problem, Quantity
 from colloc.gaits.gait_fields import CLASSES, fields, gait_from, part_from
-from colloc.mechanics.densities import LENGTH, JointMap
+from colloc.mechanics.densities import LENGTH, Instants, JointMap
 from colloc.results.robot import joint_torques
 from colloc.verification.adaptive_motion import whole_totals
 from tests.shared.cases import slow_but
@@ -61,8 +61,17 @@ def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_b
     slopes = (joints.angles(t + h) - joints.angles(t - h)) / (2 * h)
     np.testing.assert_allclose(joints.rates(t), slopes, atol=1e-7)
     np.testing.assert_allclose(joints.angles(t)[1], -0.5 * motors.angles(t)[0], atol=1e-12)
-    ways = [whole_totals([LENGTH], path)[0]["length"] for path in (joints, motors)]
+    bend = Quantity("bend", "sum(angle**2)")
+    ways = [whole_totals([LENGTH, bend], path)[0] for path in (joints, motors)]
     assert ways[0] == ways[1]  # what the motors turn
+    body = Chain((0.2,) * 5)
+    now = Instants(body, LAW, *joints(t), 1e-2, joint_map=joints.joint_map)
+    np.testing.assert_allclose(now.angle, motors.angles(t))
+    stuck = Coupled(Harmonic(1), gears=(*gears[:3], (0, 0)), stuck={3: 0.3})
+    path = Problem("c", body=body, gait=stuck).joint_path(*motors(t))
+    np.testing.assert_allclose(
+        path, [[*x[:3], y + 0 * t] for x, y in zip(joints(t), (0.3, 0.0), strict=True)]
+    )
     np.testing.assert_allclose(
         joints.joint_map.motor_rates(joints.angles(t) - joints.joint_map.offset), motors.angles(t)
     )

@@ -25,6 +25,9 @@ EQUAL, STILL = Friction(), np.zeros((2, 1))
 WEIGHTS = (0.2, 0.5, 0.3)
 
 
+TOES = [Wheel(0, 0.2, angle=s * 0.3, offset=s * 0.05) for s in (1, -1)]
+
+
 def on_each(foot, **fields):
     """A chain with feet or pads alike on each link."""
     return Chain(LENGTHS, feet=tuple(foot(link) for link in range(3)), **fields)
@@ -216,6 +219,11 @@ def test_files_hold_feet_weights_and_masses(body):
         ((Wheel(0), Foot(1), Foot(2)), False),
         ((Pad(0, 0.0, 0.3), Foot(1), Pad(2, 0.7, 1.0)), True),
         ((Pad(0, 0.0, 0.3), Foot(1), Pad(2, 0.0, 0.3)), False),
+        ((*TOES, Foot(1), *(foot.from_head(3) for foot in TOES)), True),
+        (
+            (*TOES, Foot(1), *(Wheel(2, 0.8, angle=s * 0.3, offset=s * 0.05) for s in (1, -1))),
+            False,
+        ),
     ],
 )
 def test_symmetries_need_symmetric_feet(feet, symmetric):
@@ -233,7 +241,7 @@ def on_axles(**wheel):
 def test_a_wheel_says_which_of_the_two_laws_it_has():
     assert Wheel(0, rolling=0.1).friction == Friction(mu_t=1.0, mu_f=0.1, mu_b=0.1)
     assert Wheel(0, rolling=0.1, axle=True).friction == Axle(rolling=0.1, sideways=1.0)
-    assert Wheel(0, axle=True).kind == "wheel"
+    assert (Wheel(0, axle=True).kind, Pad(0, friction=Wheel(0).friction).kind) == ("wheel", "pad")
     assert Foot(0, friction=Axle(rolling=1.0)).kind == "foot"
 
 

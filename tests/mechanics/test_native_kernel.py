@@ -292,27 +292,16 @@ def five_links():
 
 
 @needs_kernel
-def test_instants_that_newton_loses_are_balanced_all_the_same():
+def test_instants_that_newton_loses_are_balanced_joints_at_rest_rest_what_is_no_number_has_no_motion():
     compiled, shapes, rest = five_links()
     expected, *_ = compiled.simulate(shapes, rest)
     for size in (1.0, 100.0, np.nan):
         wild = compiled.simulate(shapes, size * np.random.default_rng(0).normal(size=rest.shape))[0]
         np.testing.assert_allclose(wild, expected, rtol=0, atol=1e-8)
-
-
-@needs_kernel
-def test_a_body_whose_joints_rest_rests():
-    compiled, shapes, rest = five_links()
-    expected, *_ = compiled.simulate(shapes, rest)
     shapes.rates[:, ::7] = 0.0
     z, out, _ = compiled.simulate(shapes, rest)
     assert not np.vstack([z, out])[:, ::7].any()
     np.testing.assert_allclose(z[:, 1:7], expected[:, 1:7], rtol=0, atol=1e-8)
-
-
-@needs_kernel
-def test_a_shape_that_is_no_number_has_no_motion():
-    compiled, shapes, rest = five_links()
     shapes.angles[1, 5] = np.nan
     assert compiled.simulate(shapes, rest) is None
 

@@ -8,9 +8,8 @@ from colloc.numerics.peaks import curvature_of_moving, peaks
 from colloc.numerics.schemes import scheme
 
 ORDERS = {"trapezoid": 2, "hermite-simpson": 4}
-ORDERS |= {f"gauss-{s}": 2 * s for s in range(1, 7)} | {
-    f"radau-{s}": 2 * s - 1 for s in range(1, 7)
-}
+ORDERS |= {f"gauss-{s}": 2 * s for s in range(1, 7)}
+ORDERS |= {f"radau-{s}": 2 * s - 1 for s in range(1, 7)}
 
 
 @pytest.mark.parametrize(("name", "order"), ORDERS.items())

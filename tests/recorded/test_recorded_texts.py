@@ -24,10 +24,11 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
+import colloc as library
 from colloc import Objective, Reference, save
 from colloc.commands.main import main
 from colloc.commands.solve import summary_lines
-from colloc.gaits.parameters import parameters
+from colloc.gaits.parameters import parameters  # noqa: F401 (which texts name)
 from colloc.pictures.movie import pictures
 from colloc.pictures.report_page import report_page
 from colloc.results.answer import SecondOrder
@@ -90,22 +91,10 @@ def show(file, first=1, last=None):
 
 
 @also
-def represent(*names):
-    every = (x for name in names for x in (state(name), state(name).problem, state(name).answer))
-    return "\n".join(map(repr, every))
-
-
-@also
-def describe(*names):
-    each = (x for name in names for x in (state(name).problem.law, state(name).problem.body))
-    return "\n".join(x.describe() for x in each)
-
-
-@also
-def numbers(*names):
-    """Those of which a problem has sensitivities."""
-    every = (x for name in names for x in parameters(state(name).problem))
-    return ", ".join(f"{x.name} {x.value:.4g}" for x in every)
+def say(*words):
+    """A text, or what a part says of itself, by any expression with the public names."""
+    made = eval(" ".join(words), {x: getattr(library, x) for x in library.__all__} | globals())
+    return made.describe() if hasattr(made, "describe") else str(made)
 
 
 @also
@@ -153,19 +142,6 @@ def front_of(*names):
     return ParetoFront(points[0].problem, aims, points, gaps)
 
 
-@also
-def rest(name, *phases):
-    """Heading and place of a body that was at rest at phase 0."""
-    motion = state(name).from_rest(np.array(phases, dtype=float))
-    rows = zip(motion.t, motion.theta, *motion.centre, strict=True)
-    return "\n".join(", ".join(f"{x:.5f}" for x in row) for row in rows)
-
-
-@also
-def card(name):
-    return words_of(state(name)._repr_html_())
-
-
 def words_of(page):
     plain = re.findall(r'"(grid|shape|width|arrowScale)":([^,}]*)', page)
     page += "\n".join(map(" ".join, plain))
@@ -180,11 +156,6 @@ def draw(name, panel=None):
     if panel is None:
         return described(solution.plot())
     return described(solution.plot(Figure().add_subplot(), panel).figure)
-
-
-@also
-def sheet(name):
-    return described(state(name).robot().plot())
 
 
 def described(figure):

@@ -98,6 +98,11 @@ def test_a_gait_is_played_at_the_pace_whose_period_it_says():
     space, v = space_near(problem(np.exp(-1.6)), ROUND)
     fixed = ReducedProgram(space, 1e-2).period(v)
     assert free["period"] == pytest.approx(np.exp(0.8))
+    with pytest.raises(colloc.ProblemError, match="does not say its pace"):
+        stated.regime.at(ROUND)
+    assert problem(0.3).regime.at(ROUND).froude == pytest.approx(0.3)
+    # no slower than is allowed
+    assert space_near(stated, replace(ROUND, log_period=9.0))[1][-1] == pytest.approx(np.log(10))
     assert (free["distance"], free["work"]) == pytest.approx(
         (fixed["distance"], fixed["work"]), rel=1e-9
     )

@@ -220,16 +220,16 @@ def test_what_must_be_reached_is_stated_in_units_of_friction_too():
 
 def test_a_pace_counts_by_its_ratio_to_friction():
     """It drives momenta: with a tenth of it and of the Froude number a gait moves as before."""
-    periods = []
+    periods, asked = [], {"gait": Harmonic(1), "objective": "driven efficiency"}
     for size in (1.0, 0.1):
-        space, v = space_near(
-            stated(size, size, size, froude=0.05 * size, gait=Harmonic(1)), ellipse(0.3, 1.0, 0.5)
-        )
+        problem = stated(size, size, size, froude=0.05 * size, **asked)
+        space, v = space_near(problem, ellipse(0.3, 1.0, 0.5))
         periods.append(ReducedProgram(space, 1e-2).period(v))
     unit, light = periods
     assert unit["distance"] > 1e-3
     assert light["distance"] == pytest.approx(unit["distance"], rel=1e-9)
-    assert light["work"] == pytest.approx(0.1 * unit["work"], rel=1e-9)
+    for name in ("work", "driven_work"):
+        assert light[name] == pytest.approx(0.1 * unit[name], rel=1e-9)
 
 
 @pytest.mark.parametrize("text", EXPRESSIONS)
@@ -247,8 +247,9 @@ def test_values_gradients_and_symbols_agree(text):
 
 
 def test_gradients_of_every_operation_are_those_of_differences():
-    text, h = "sqrt(distance) * abs(rotation - 1) / length**-1 + 3 - (2 - work) / +work", 1e-6
-    objective = Objective(text)
+    text = "sqrt(distance) * abs(rotation - 1) / length**-1 + 3 - (2 - work) / +work**0 * work"
+    text += " + tanh(distance) * log(work) - exp(-rotation) + where(distance < 1, work**2, work)"
+    objective, h = Objective(text), 1e-6
     for name, slope in objective.partials(PERIOD).items():
         up, down = (objective(PERIOD | {name: PERIOD[name] + side * h}) for side in (1, -1))
         assert slope == pytest.approx((up - down) / (2 * h), rel=1e-8)

@@ -258,4 +258,7 @@ def test_a_member_that_points_somewhere_is_known_by_its_parameters_and_kept_in_f
     free = gaits.parameters(gait.member(v[:-1], 2))
     np.testing.assert_allclose(free[:-1], v[:-1], atol=1e-12)
     assert np.isnan(free[-1])
+    # begun at another phase it would point elsewhere
+    later = colloc.Fourier([0.0, 0.0], [[1.0], [0.2]], [[0.7], [1.0]], theta=0.7)
+    assert (gaits.parameters(later)[-1] == 0.7) != (gait == Harmonic(2))
     assert problem.gait == problem.with_(grade=0.0).gait == gait

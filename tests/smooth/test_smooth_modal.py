@@ -165,8 +165,7 @@ def test_panels_stay_where_they_do_not_matter():
     assert on_more_panels(found(16, delta=0.5)) is None
     sideways = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
     assert on_more_panels(found(8, friction=sideways, mesh_tolerance=1e-2)) is None
-    # and a chain has none to add
-    stated = Problem("chain", gait=Harmonic(1, "antipodal"))
+    stated = Problem("chain", gait=Harmonic(1, "antipodal"))  # and a chain has none to add
     assert on_more_panels(evaluate_at(*space_near(stated, stated.guess), 0.1)) is None
 
 

@@ -27,7 +27,7 @@ from tests.shared.stages import program_of
 
 LOOP = ellipse(0.2, 1.3, 0.8)
 SKEW = Chain((0.3, 0.25, 0.45))
-PARTS = (Foot(0), Wheel(1, 0.3, rolling=0.1), Pad(2, 0.2, 0.6))
+PARTS = (Foot(0, friction=colloc.PowerLaw(0.5)), Wheel(1, 0.3, rolling=0.1), Pad(2, 0.2, 0.6))
 PARTS += tuple(Foot(2, 0.9, offset=y) for y in (0.05, -0.05))
 CASES = """
 lying: body=SKEW
@@ -48,7 +48,7 @@ driven uphill: objective="driven efficiency", grade=0.1
 driven with inertia uphill: objective="driven efficiency", froude=0.3, grade=0.1
 joint speeds: speed_limit=9.0
 modes: body=ModalBody(3), gait=Harmonic(1, "antipodal"), guess=None
-velocity map: formulation="implicit velocity", body=SKEW
+velocity map: formulation="implicit velocity", body=SKEW, at_least={"length": 1.0}
 """
 GEARS = ((1, 0), (0.5, 0.5), (0, 1))
 CASES = REDUCED | cases(CASES, globals())
