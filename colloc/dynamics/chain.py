@@ -201,17 +201,66 @@ def torque_function(body: Chain, friction: Law) -> Any:
 
 
 @lru_cache(maxsize=32)
-def of_torques(body: Chain, friction: Law, formula: Quantity | PathLimits) -> Any:
-    """CasADi functions (y, delta) to a density, or to shares of limits, ``(n_row, n_time)``, and to
-    the derivatives along y = (q, r, q'', momenta, Froude number), row by row."""
+def _torques_and_slopes(body: Chain, friction: Law) -> Any:
+    """CasADi function as `torque_function`, to the torques and their derivatives along all but
+    delta."""
     import casadi as ca
 
+    function = torque_function(body, friction)
+    symbols = function.sx_in()
+    torques, along = function(*symbols), ca.vertcat(*symbols[:4], symbols[-1])
+    slopes = ca.vec(ca.densify(ca.jacobian(torques, along).T))
+    return ca.Function("torques", symbols, [torques, slopes], {"cse": True})
+
+
+def torques_at(
+    body: Chain, friction: Law, y: np.ndarray, delta: float, *, differentiated: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joint torques ``(n_joint, n_time)`` at y = (angles, rates, accelerations, momenta, Froude
+    number), of which the last is one for all; and their derivatives along y, ``(n_joint, n_y,
+    n_time)``, or none."""
+    n, n_time, library = body.n_joint, y.shape[1], native_kernel(body, friction)
+    angles, rates, accelerations, states, froude = np.split(y, [n, 2 * n, 3 * n, len(y) - 1])
+    if library is None:
+        given = angles, rates, accelerations, states, delta, froude
+        torques, slopes = _torques_and_slopes(body, friction)(*given)
+        return torques.full(), slopes.full().reshape(n, -1, n_time)
+    moving = Moving(body, friction, angles, rates, delta, None)
+    slopes = np.empty((n, len(y), n_time)) if differentiated else None
+    torques = np.empty((n, n_time))
+    at = body.inertia_column(), float(froude[0, 0]), states, accelerations
+    call_for_all(library.colloc_torques, moving, *at, torques, slopes)
+    return torques, np.empty((n, 0, n_time)) if slopes is None else slopes
+
+
+@lru_cache(maxsize=32)
+def of_torques(body: Chain, friction: Law, formula: Quantity | PathLimits) -> Any:
+    """Functions (y, delta) to a density, or to shares of limits, ``(n_row, n_time)``, and to the
+    derivatives along y, as of `torques_at`, ``(n_row, n_y, n_time)``."""
+    import casadi as ca
+
+    from colloc.numerics.repeated import at_instances
+
     n = body.n_joint
-    sizes = (("q", n), ("r", n), ("a", n), ("momenta", len(STATES)), ("froude", 1))
-    q, r, accelerations, momenta, froude = parts = [ca.SX.sym(*each) for each in sizes]
-    y, delta = ca.vertcat(*parts), ca.SX.sym("delta")
-    moments = torque_function(body, friction)(q, r, accelerations, momenta, delta, froude)
-    out = formula.at(Instants(body, friction, q, r, delta, moments=moments, froude=froude))
-    slope = ca.vec(ca.densify(ca.jacobian(out, y).T))
-    values = ca.Function("values", [y, delta], [out], {"cse": True})
-    return values, ca.Function("slopes", [y, delta], [slope], {"cse": True})
+    q, r, torques, froude = parts = [ca.SX.sym("x", size) for size in (n, n, n, 1)]
+    delta, x = ca.SX.sym("delta"), ca.vertcat(*parts)
+    out = formula.at(Instants(body, friction, q, r, delta, moments=torques, froude=froude))
+    slope = ca.vec(ca.densify(ca.jacobian(out, x).T))
+    along_x = ca.Function("slopes", [x, delta], [slope], {"cse": True})
+
+    def values(y: np.ndarray, delta: float) -> np.ndarray:
+        (q, r), froude = np.split(y[: 2 * n], 2), y[-1:]
+        moments = torques_at(body, friction, y, delta)[0]
+        return formula.at(Instants(body, friction, q, r, delta, moments=moments, froude=froude))
+
+    def slopes(y: np.ndarray, delta: float) -> np.ndarray:
+        moments, along_y = torques_at(body, friction, y, delta, differentiated=True)
+        x = np.concatenate([y[: 2 * n], moments, y[-1:]])
+        direct = at_instances(along_x, [x, np.full((1, x.shape[1]), delta)])
+        direct = direct.reshape(x.shape[1], out.shape[0], len(x)).transpose(1, 2, 0)
+        total = np.einsum("rjt,jyt->ryt", direct[:, 2 * n : -1], along_y)
+        total[:, : 2 * n] += direct[:, : 2 * n]
+        total[:, -1] += direct[:, -1]
+        return total
+
+    return values, slopes

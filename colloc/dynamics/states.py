@@ -66,7 +66,8 @@ class CollocatedStates:
     def integrals(self, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """``H r`` at the points, ``(n_state, n_point)``, and at the edges, ``(n_state, n + 1)``."""
         stages = rates.reshape(len(rates), *self._b.shape)
-        edges = np.cumsum(np.pad((self._b * stages).sum(axis=2), ((0, 0), (1, 0))), axis=1)
+        edges = np.zeros((len(rates), len(self._b) + 1))
+        np.cumsum((self._b * stages).sum(axis=2), axis=1, out=edges[:, 1:])
         return (edges[:, :-1, None] + self._within(stages)).reshape(rates.shape), edges
 
     def solve(
@@ -244,15 +245,18 @@ class _Linear:
         self._inverse = np.linalg.inv(_stage_matrices(a, on_states.reshape(k, k, n, s)))
         self._gain = np.einsum("nj,njab->najb", b, slopes).reshape(n, k, s * k)
         self._response = self._inverse.reshape(n, s * k, s, k).sum(axis=2)
-        blocks = np.tile(one, (n + 1, 2, 1, 1))
-        blocks[0] = np.where(free[:, None], -image, one), np.diag(free)
-        blocks[1:, 0] += self._gain @ self._response
-        blocks[1:, 0] *= -1.0
-        columns = np.append([0, n], np.arange(n)[:, None] + [0, 1])
+        # the two blocks of each column, of the begin of an interval and of its end before
+        first, second = np.tile(one, (2, n + 1, 1, 1))
+        first[0], first[-1] = np.where(free[:, None], -image, one), np.diag(free)
+        second[:-1] += self._gain @ self._response
+        second[:-1] *= -1.0
+        rows = np.arange(n + 1)[:, None] + [0, 1]
+        rows[-1] = 0, n
         # slopes that are no numbers stay in the stages
-        blocks = np.nan_to_num(blocks.reshape(-1, k, k))
-        rows = blocks, columns, np.arange(0, 2 * n + 3, 2)
-        self._edges = splu(sparse.bsr_matrix(rows).tocsc())
+        columns = np.nan_to_num(np.concatenate([first, second], axis=1)).transpose(0, 2, 1)
+        places = np.repeat((k * rows[:, :, None] + np.arange(k)).reshape(n + 1, 1, -1), k, axis=1)
+        ends = 2 * k * np.arange(k * (n + 1) + 1)
+        self._edges = splu(sparse.csc_matrix((columns.ravel(), places.ravel(), ends)))
 
     def _by_interval(self, at_points: np.ndarray) -> np.ndarray:
         n, s, k = self._shape

@@ -67,6 +67,7 @@ _SIGNATURES = {
     "colloc_balance": "ppdlippppp",
     "colloc_motion": "ppppp",
     "colloc_momenta": "pdpipp",
+    "colloc_torques": "pdpppp",
     "colloc_balances": "pdpp",
     "colloc_repeating": "pdnippppppp",
     "colloc_period": "nippppdp" + "ppdpdpppp",

@@ -35,7 +35,7 @@ class Mesh:
     def n_point(self) -> int:
         return int(self.points[-1, -1]) + 1
 
-    @property
+    @cached_property
     def times(self) -> np.ndarray:
         """Phases of the points, ``(n_point,)``."""
         times = np.empty(self.n_point)

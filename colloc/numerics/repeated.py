@@ -191,7 +191,7 @@ class Nlp:
 
     def _of_instances(self, kind: int, columns: list[list[np.ndarray]]) -> list[np.ndarray]:
         functions = (each.function.functions[kind] for each in self._repeated)
-        return [_at_instances(*both) for both in zip(functions, columns, strict=True)]
+        return [at_instances(*both) for both in zip(functions, columns, strict=True)]
 
     def _values_at(self, at: np.ndarray) -> np.ndarray:
         """Objective and rows, ``(1 + m,)``, at ``(x, delta)``."""
@@ -309,12 +309,17 @@ def _pattern(matrix: sparse.csc_matrix) -> ca.Sparsity:
     return ca.Sparsity(*matrix.shape, matrix.indptr.tolist(), matrix.indices.tolist())
 
 
-def _at_instances(function: ca.Function, columns: list[np.ndarray]) -> np.ndarray:
+@lru_cache(maxsize=64)
+def _mapped(function: ca.Function, n: int) -> ca.Function:
+    return function.map(n)
+
+
+def at_instances(function: ca.Function, columns: list[np.ndarray]) -> np.ndarray:
     """Values of a function of columns, one instance after the other."""
     n_instance = columns[0].shape[1]
     values = np.empty(function.nnz_out(0) * n_instance)
     if values.size:
-        buffer, evaluate = function.map(n_instance).buffer()
+        buffer, evaluate = _mapped(function, n_instance).buffer()
         arguments = [each.ravel(order="F") for each in columns]  # held till the end
         for k, each in enumerate(arguments):
             if each.size:

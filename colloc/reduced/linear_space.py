@@ -107,7 +107,7 @@ class LinearSpace(SearchSpace):
         return angles, rates / np.linalg.norm(rates, axis=0) if self._relative else rates
 
     def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
-        matrix = self._gaits.angle_matrix(self.mesh.times, self._matrix.shape[1] // 2, 2)
+        matrix = self._second_derivatives(self.mesh.times)
         return self.shape_vjp(v, np.einsum("kjt,tjp->kp", on_points, matrix))
 
     def vjp(self, v: np.ndarray, on_shape: np.ndarray, on_pace: np.ndarray) -> np.ndarray:

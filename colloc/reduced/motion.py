@@ -204,7 +204,7 @@ class ReducedMotion:
         n_row, n_point = share.size, self.mesh.n_point
         if inertial := self._of_torques(limits):
             y = self._torque_arguments(s)[:, point]
-            slopes = inertial[1](y, delta).full().reshape(-1, len(y), n_row)
+            slopes = inertial[1](y, delta)
         else:
             slopes = density_slopes(limits, self._instants(s).take(point))
         at_points = np.zeros((n_row, slopes.shape[1], n_point))
@@ -226,7 +226,7 @@ class ReducedMotion:
     def _at_points(self, formula: Any, s: _State, t: np.ndarray | None = None) -> np.ndarray:
         """Values of a formula ``(n_row, n_point)``; with torques also at times of the mesh."""
         if found := self._of_torques(formula):
-            return found[0](self._torque_arguments(s, t), s.delta).full()
+            return found[0](self._torque_arguments(s, t), s.delta)
         return formula.at(self._instants(s))
 
     def _along_torque_arguments(
@@ -246,7 +246,7 @@ class ReducedMotion:
             froude = kind.froude_at(s.shapes, s.passed.static)
             on_log_period = -2.0 * froude * on_froude.sum(axis=(1, 2))
             totals = [TotalGradient(static=value) for value in on_log_period]
-        on_points = np.pad(on_shape, ((0, 0), (0, 1), (0, 0)))
+        on_points = np.concatenate([on_shape, np.zeros((m, 1, self.mesh.n_point))], axis=1)
         return totals, on_points, by_states, on_accelerations
 
     def _torque_arguments(self, s: _State, t: np.ndarray | None = None) -> np.ndarray:
@@ -280,8 +280,8 @@ class ReducedMotion:
         on_accelerations = np.zeros((m, n_joint, n_point))
         for row, quantity in enumerate(self._integrals, len(totals)):
             if inertial := self._of_torques(quantity):
-                slopes = inertial[1](self._torque_arguments(s), delta).full()
-                along = self._along_torque_arguments(s, kind.periods * weight * slopes[None])
+                slopes = inertial[1](self._torque_arguments(s), delta)
+                along = self._along_torque_arguments(s, kind.periods * weight * slopes)
                 (gradients[row],), on_points[row], by_states[row], on_accelerations[row] = along
             else:
                 now = self._instants(s)

@@ -75,6 +75,8 @@ class SearchSpace:
     ) -> None:
         self.control, self.edges, self.scheme, self.far = control, edges, scheme, far
         self.mesh, self._full = control.mesh(edges, scheme), full
+        gait, n_joint = control.admissible.gait, control.admissible.n_joint
+        self._second_derivatives = keep_last(lambda t: gait.angle_matrix(t, n_joint, 2))
 
     @property
     def n(self) -> int:
@@ -111,9 +113,8 @@ class SearchSpace:
 
     def accelerations(self, v: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Second derivatives of the angles, ``(n_joint, n_time)``."""
-        admissible = self.control.admissible
-        shape = self.full_parameters(v)[: admissible.n_shape]
-        return (admissible.gait.angle_matrix(t, admissible.n_joint, 2) @ shape).T
+        shape = self.full_parameters(v)[: self.control.admissible.n_shape]
+        return (self._second_derivatives(t) @ shape).T
 
     def accelerations_vjp(self, v: np.ndarray, on_points: np.ndarray) -> np.ndarray:
         """Derivatives ``(k, n)`` of k numbers, from those along the accelerations at the points,

@@ -8,6 +8,7 @@
 
 #include "contacts.h"
 #include "repeating.h"
+#include "torques.h"
 
 #ifdef COLLOC_SOURCES
 #define TEXT_OF(name) #name
@@ -142,6 +143,19 @@ int colloc_momenta(
     const bool ready = new_room(&played);
     if (ready)
         momenta_instants(&played, first, last, spin, froude, states, columns, values, slopes);
+    return done(&played, ready);
+}
+
+/* Joint torques there at such joint accelerations (torques.h). */
+int colloc_torques(
+    CHAIN, const double *spin, double froude, const double *states, const double *accelerations, double *torques, double *slopes)
+{
+    Played played = PLAYED;
+    Wrench *room = malloc(5 * (size_t)n * sizeof *room);
+    const bool ready = new_room(&played) && room;
+    if (ready)
+        torques_at_instants(&played, first, last, spin, froude, states, accelerations, room, torques, slopes);
+    free(room);
     return done(&played, ready);
 }
 
