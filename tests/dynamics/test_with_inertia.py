@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 import colloc
 from colloc.commands.solve import summary_lines
 from colloc.dynamics import dynamics
-from colloc.dynamics.chain import momenta_at
+from colloc.dynamics.chain import momenta_at, torques_at
 from colloc.dynamics.control_problem import control_problem
 from colloc.dynamics.dynamics import Shapes
 from colloc.gaits.objective import objective_from
@@ -62,8 +62,14 @@ def test_the_kernel_and_the_symbolic_statement_have_the_derivatives_of_differenc
         return momenta_at(body, law, (angles, rates, 0.3), states, 0.1)
 
     value, found = compiled()
+    accelerations, froude = rng.normal(size=(n_joint, 50)), np.full((1, 50), 0.1)
+    y = np.vstack([given[: 2 * n_joint], accelerations, given[2 * n_joint :], froude])
+    torques = torques_at(body, law, y, 0.3, differentiated=True)
     with numpy_instead():
         symbolic = compiled()
+        symbolic_torques = torques_at(body, law, y, 0.3)
+    for each, wanted in zip(torques, symbolic_torques, strict=True):
+        np.testing.assert_allclose(each, wanted, rtol=1e-9, atol=1e-11)
     np.testing.assert_allclose(value, stated(given), rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(symbolic[0], value, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(symbolic[1], found, rtol=1e-9, atol=1e-9)
