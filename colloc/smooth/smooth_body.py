@@ -343,9 +343,6 @@ class PrescribedBody(SmoothBody):
         breaks = self.prescribed().breaks
         return super().breaks(angles) if breaks is None else breaks(_phase(angles))
 
-    def wave(self, waves: float) -> tuple[np.ndarray, np.ndarray]:
-        return np.array([1.0, 0.0]), np.array([0.0, 1.0])
-
 
 def schedule(body: Body) -> tuple[float, ...]:
     """Phases from 0 to the solved part of a period between which a prescribed motion is smooth in

@@ -393,7 +393,16 @@ def test_a_tighter_bound_is_offered_where_one_can_be_computed_alone(tmp_path, mo
         assert offered == computed == (isinstance(body, Chain) and body.n_link <= 5), body
 
 
-@pytest.mark.parametrize("changed", [{"rotation": 0.3}, {"rotation": None}, {"objective": "speed"}])
+NONE_IS_KNOWN = (
+    {"rotation": 0.3},
+    {"rotation": None},
+    {"objective": "speed"},
+    {"grade": 0.1},
+    {"froude": 0.1},
+)
+
+
+@pytest.mark.parametrize("changed", NONE_IS_KNOWN, ids=str)
 def test_no_bound_is_offered_of_gaits_that_turn_or_are_sought_for_something_else(changed):
     usual = Problem("usual", gait=Harmonic(1))
     assert refusal(usual) == ""

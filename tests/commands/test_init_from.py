@@ -206,7 +206,9 @@ def test_an_mjcf_has_classes_degrees_and_capsules(tmp_path, capsys):
     assert read(tmp_path, usual, kind="xml").hash == problem.hash
 
 
-def test_an_mjcf_counts_angles_from_its_reference_and_the_stated_mass_of_a_body_alone(tmp_path):
+def test_an_mjcf_counts_angles_from_its_reference_and_the_stated_mass_of_a_body_alone(
+    tmp_path, capsys
+):
     turned = SWIMMER.replace('name="rot3" class="weak"', 'name="rot3" class="weak" ref="10"')
     heavy = turned.replace(
         '<joint name="rot2"', '<inertial pos="0.1 0 0" mass="0.6"/><joint name="rot2"'
@@ -214,6 +216,21 @@ def test_an_mjcf_counts_angles_from_its_reference_and_the_stated_mass_of_a_body_
     problem = read(tmp_path, heavy, kind="xml")
     assert np.degrees(problem.joint_limit[1]).tolist() == pytest.approx([-40, 50], rel=1e-5)
     assert problem.body.weights == pytest.approx([0.25, 0.5, 0.25])
+    # the ends of cylinders are flat
+    flat, lengths = SWIMMER.replace("capsule", "cylinder"), np.array([0.19, 0.2, 0.19])
+    assert read(tmp_path, flat, kind="xml").body.lengths == pytest.approx(lengths / lengths.sum())
+    capsys.readouterr()
+    for changed, note in (
+        (heavy, ""),
+        (heavy.replace('pos="0.1', 'pos="0.12'), "the mass of mid is taken to be in its middle"),
+        (
+            SWIMMER.replace('<geom fromto="0.01', '<geom mass="0" fromto="0.01'),
+            "a link has no mass",
+        ),
+    ):
+        weights, said = read(tmp_path, changed, kind="xml").body.weights, capsys.readouterr().out
+        assert note in said
+        assert (bool(weights), "mass" in said) == ("no mass" not in note, bool(note))
 
 
 def test_friction_of_an_mjcf_is_that_of_geoms_on_the_floor_what_is_left_is_said(tmp_path, capsys):
@@ -263,6 +280,9 @@ def test_what_is_no_planar_chain_is_refused_by_name_and_with_a_cure(more, words,
         assert word in said
 
 
+BODY = "<mujoco><worldbody><body><body name='x'>{}</body></body></worldbody></mujoco>"
+
+
 @pytest.mark.parametrize(
     ("content", "word"),
     [
@@ -272,6 +292,8 @@ def test_what_is_no_planar_chain_is_refused_by_name_and_with_a_cure(more, words,
         ("<robot xmlns:xacro='http://ros.org/wiki/xacro'><xacro:arm/></robot>", "xacro FILE"),
         ("<mujoco><worldbody/></mujoco>", "0 bodies"),
         ("<mujoco><include file='a.xml'/></mujoco>", "mj_saveLastXML"),
+        (BODY.format("<joint/><joint/>"), "has 2 joints: a chain has one"),
+        (BODY.format("<joint type='slide'/>"), "no joint of it turns"),
     ],
 )
 def test_other_files_are_named_for_what_they_are(content, word, tmp_path, capsys):

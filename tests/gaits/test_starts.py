@@ -65,6 +65,7 @@ def test_without_a_guess_a_search_begins_where_the_body_moves_enough(speed, limi
     [
         ([0.0, 0.0], np.pi, np.inf),
         ([0.5, -0.25], 2.0, starts.SAFE * 4.0),
+        ([0.5, -0.25], ((-0.4, 3.0), (-0.5, 1.0)), starts.SAFE * 2.0),
         ([0.5, 0.5], np.pi, starts.SAFE * 4 * np.pi / 3),  # the ends meet as a triangle, at 2 pi/3
     ],
 )

@@ -151,6 +151,19 @@ def test_the_paper_s_crawler_is_one_of_them():
     np.testing.assert_allclose(BODY.tangent(s, shown), known, atol=1e-12)
 
 
+def test_a_wave_takes_a_bump_to_the_front_and_a_chain_s_bends_are_pressed_into_one_there():
+    for waves in (1.0, -1.0):
+        shapes = np.stack(BODY.wave(waves), axis=1)  # at phase 0 and a quarter later
+        ends = BODY.breaks(shapes)[1:-1]
+        assert (ends[0, 0], ends[-1, 1]) == pytest.approx((0.45, 0.55))
+        assert BODY.tangent(ends[2:3], shapes)[0] == pytest.approx([0.0, waves], abs=1e-12)
+    laid = BODY.from_chain(np.full(3, 1 / 3)) @ [[0.4], [-0.4]]
+    assert BODY.breaks(laid)[-2, 0] == pytest.approx(0.55)
+    links = BODY.tangent(0.55 - BODY.width * np.array([[5], [3], [1]]) / 6, laid)
+    assert np.sign(links[:, 0]).tolist() == [-1, 1, -1]
+    np.testing.assert_allclose(Body.wave(colloc.Chain(), -1.0), colloc.Chain().wave(-1.0))
+
+
 def test_the_mirrored_half_is_the_negative_shape():
     rng, s = np.random.default_rng(5), np.linspace(0.44, 0.56, 60)[:, None]
     q = np.stack([rng.uniform(-LAP, LAP, 4), *rng.normal(scale=0.4, size=(BODY.modes, 4))])

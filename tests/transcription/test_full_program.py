@@ -352,6 +352,17 @@ def test_a_delta_that_rounding_hides_is_named():
     assert "rounding" not in explanation(program, result, 1e-9)
 
 
+def test_bounds_that_were_moved_stay_where_a_program_is_placed_anew():
+    full, x, *_ = at_guess(stated("actuators", rotation=0.2))
+    for name, by in ((ACTUATORS, -0.1), ("rotation", 0.3)):
+        rows = full.groups[name]
+        full = full.with_bounds(name, full.row_lower[rows] - by, full.row_upper[rows] + by)
+    again, there = full.moved_to(x)
+    np.testing.assert_allclose(there, x, atol=1e-12)
+    for bounds in ("row_lower", "row_upper"):
+        np.testing.assert_array_equal(getattr(again, bounds), getattr(full, bounds))
+
+
 def test_one_variable_in_two_places_of_a_function_has_both_mixed_derivatives():
     """Of x y, which is then x squared."""
     program = Program(2)
