@@ -345,9 +345,6 @@ def test_on_two_feet_a_link_the_bound_lies_between_the_best_small_gait_and_frict
     budget = Budget(4, (1,), 8, 16, 4, starts=60, tolerance=0.01)
     bound = efficiency_bound(Chain(feet=2), Friction(), 1.0, budget=budget)
     assert small_gait(Chain(feet=2), Friction(), np.zeros(2)).efficiency < bound.sampled < 0.75
-
-
-def test_no_bound_says_less_than_friction_alone():
     coarse = Budget(2, (1,), 6, 8, 1, starts=10)
     bound = efficiency_bound(Chain(feet=1), Friction(0.5, 0.5, 0.5), budget=coarse)
     assert bound.sampled == 2.0

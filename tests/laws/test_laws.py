@@ -68,8 +68,10 @@ def test_friction_opposes_the_motion_and_does_not_tell_left_from_right(law):
         assert -(fs * c + fn * s).max() == pytest.approx(law.smallest, rel=1e-4)
 
 
-@each
-def test_a_law_in_other_units_is_the_same_law(law):
+@pytest.mark.parametrize("law", [*EVERY, Friction()], ids=lambda law: type(law).__name__)
+def test_a_law_in_other_units_or_in_a_file_is_the_same_law(law):
+    assert isinstance(law, Law)
+    assert part_from(LAWS, fields(law)) == law
     vs, vn, _ = moving_links(2)
     force = np.array(law.density(vs, vn, 1e-2))
     slower = law.in_speeds_of(4.0).density(vs / 4, vn / 4, 1e-2 / 4)
@@ -248,13 +250,6 @@ def test_the_power_law_ends_in_drag_and_in_coulomb_friction():
     np.testing.assert_allclose(above, -below, atol=1e-3 * np.abs(above).max())
     ratio = (power(PowerLaw(2e-3, **mu)) - dry) / (power(PowerLaw(1e-3, **mu)) - dry)
     np.testing.assert_allclose(ratio, 2.0, atol=0.05)
-
-
-@pytest.mark.parametrize("law", [*EVERY, Friction()], ids=lambda law: type(law).__name__)
-def test_a_law_is_kept_in_files(law):
-    assert isinstance(law, Law)
-    assert type(law) in LAWS
-    assert part_from(LAWS, fields(law)) == law
 
 
 ROOT = Path(__file__).resolve().parents[2]

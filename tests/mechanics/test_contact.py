@@ -99,15 +99,11 @@ def corner_peak(gait):
     return checks, which[mine][:1], times[mine][[np.argmax(values)]], values.max()
 
 
-def test_the_peak_at_a_corner_is_found_where_dense_sampling_finds_it():
+def test_the_peak_at_a_corner_is_that_of_dense_samples_and_a_held_share_follows_it_to_second_order():
     checks, corner, time, peak = corner_peak(AROUND_THE_CORNER)
     dense = AROUND_THE_CORNER.angles(time + np.linspace(-0.01, 0.01, 200_001))
     every = np.repeat(corner, dense.shape[1])
     assert checks.values(every, dense).max() == pytest.approx(peak, abs=1e-8)
-
-
-def test_a_held_share_follows_the_peak_at_a_corner_to_second_order():
-    checks, corner, time, _ = corner_peak(AROUND_THE_CORNER)
     share = checks.shares(corner, AROUND_THE_CORNER.angles(time))
     assert 0.1 < share[0] < 0.9
     errors, blind = [], []

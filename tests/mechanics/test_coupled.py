@@ -35,14 +35,6 @@ def test_a_stuck_joint_of_a_straight_body_makes_two_links_one():
     assert stuck.efficiency == pytest.approx(whole.efficiency, rel=1e-7)
 
 
-def test_a_motor_for_every_joint_is_the_class_of_the_motors():
-    chain, t = Chain((0.2, 0.5, 0.3)), np.linspace(0, 1, 20)
-    p = np.random.default_rng(0).normal(size=Harmonic(2).size(2))
-    own = Coupled(Harmonic(2)).member(p, chain.n_joint)
-    np.testing.assert_allclose(own.angles(t), Harmonic(2).member(p, 2).angles(t), atol=1e-14)
-    np.testing.assert_allclose(Coupled(Harmonic(2)).parameters(own), p)
-
-
 def test_the_chain_plays_the_joint_angles_to_the_same_distance_and_work(broken):
     assert broken.status == "solved"
     np.testing.assert_allclose(broken.gait.angles(np.linspace(0, 1, 9))[1], 0.4)
@@ -56,6 +48,10 @@ def test_the_chain_plays_the_joint_angles_to_the_same_distance_and_work(broken):
 def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_backwards():
     gears = ((1, 0), (-0.5, 0), (0.3, -1), (0, 1))
     t, h = np.linspace(0.0, 1.0, 20), 1e-5
+    p = np.random.default_rng(0).normal(size=Harmonic(2).size(2))
+    own = Coupled(Harmonic(2)).member(p, 2)  # a motor for every joint: the class of the motors
+    np.testing.assert_allclose(own.angles(t), Harmonic(2).member(p, 2).angles(t), atol=1e-14)
+    np.testing.assert_allclose(Coupled(Harmonic(2)).parameters(own), p)
     joints = Coupled(Harmonic(1), gears=gears).driven_by(colloc.ellipse(0.1, 0.7, 0.6), 4)
     motors = joints.motor_gait
     slopes = (joints.angles(t + h) - joints.angles(t - h)) / (2 * h)

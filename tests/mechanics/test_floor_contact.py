@@ -134,7 +134,11 @@ def test_a_foot_turned_across_is_its_mirror_image_if_it_slides_alike_both_ways()
             assert Chain(feet=feet).feet[0].angle == np.pi / 2
 
 
-def test_of_feet_with_laws_of_their_own_a_body_has_the_least_the_most_and_what_all_have():
+def test_a_wheel_has_one_of_two_laws_and_a_body_the_least_the_most_and_what_all_of_its_feet_have():
+    assert Wheel(0, rolling=0.1).friction == Friction(mu_t=1.0, mu_f=0.1, mu_b=0.1)
+    assert Wheel(0, rolling=0.1, axle=True).friction == Axle(rolling=0.1, sideways=1.0)
+    assert (Wheel(0, axle=True).kind, Pad(0, friction=Wheel(0).friction).kind) == ("wheel", "pad")
+    assert Foot(0, friction=Axle(rolling=1.0)).kind == "foot"
     feet = Foot(0), Wheel(1, rolling=0.1), Foot(2, friction=Viscous())
     for n, degree in ((2, 0.0), (3, None)):
         law = Chain((1 / n,) * n, feet=feet[:n]).law(Friction(mu_t=3.0))
@@ -236,13 +240,6 @@ DELTA = 1e-4
 
 def on_axles(**wheel):
     return Chain(feet=tuple(Wheel(link, axle=True, **wheel) for link in range(3)))
-
-
-def test_a_wheel_says_which_of_the_two_laws_it_has():
-    assert Wheel(0, rolling=0.1).friction == Friction(mu_t=1.0, mu_f=0.1, mu_b=0.1)
-    assert Wheel(0, rolling=0.1, axle=True).friction == Axle(rolling=0.1, sideways=1.0)
-    assert (Wheel(0, axle=True).kind, Pad(0, friction=Wheel(0).friction).kind) == ("wheel", "pad")
-    assert Foot(0, friction=Axle(rolling=1.0)).kind == "foot"
 
 
 @pytest.mark.parametrize("wheel", [{"rolling": 1e-7}, {"rolling": 1.0, "sideways": 1e7}], ids=str)

@@ -206,7 +206,8 @@ def saddle():
     return evaluate_at(space, v, PLAIN.delta)
 
 
-def test_below_a_saddle_lies_an_optimum(saddle):
+def test_below_a_saddle_lies_an_optimum_and_nothing_below_that(saddle, found):
+    assert leave_saddle(found) is None
     assert saddle.optimal
     assert saddle.objective == pytest.approx(-0.04614, abs=2e-5)
     below = leave_saddle(saddle)
@@ -221,7 +222,3 @@ def test_a_search_that_comes_to_a_saddle_goes_on_from_there(saddle):
     assert found.answer.second_order.smallest > 0
     assert found.answer.value > -4 * saddle.objective
     assert found.answer.history[0].value == pytest.approx(0.04614, abs=2e-5)
-
-
-def test_nothing_lies_below_an_optimum(found):
-    assert leave_saddle(found) is None

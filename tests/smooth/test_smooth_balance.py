@@ -166,8 +166,11 @@ def test_in_balance_these_sums_vanish_and_what_bends_the_body_does_the_work(body
 
 
 @each_body
-def test_what_is_drawn_lies_on_the_curve_and_moves_as_it_does(body):
+def test_what_is_drawn_lies_on_the_curve_and_moves_as_it_does_which_turns_as_its_tangent_does(body):
     (q, rates, z), delta, law = shapes(body), 0.3, LAWS[0]
+    s, h = np.linspace(0, 1, 1501)[:, None] * np.ones(3), 1e-6
+    moved = (body.tangent(s, q + h * rates) - body.tangent(s, q - h * rates)) / (2 * h)
+    assert_allclose(body.turning(s, q, rates), moved, atol=1e-5 * max(np.abs(moved).max(), 1.0))
     place, velocity, along, across = plain(body, q, rates, z)
     assert_allclose(np.stack(body.outline(q)), place[:, :: (POINTS - 1) // 96], atol=1e-6)
     assert_allclose(body.centre(q), mean(place), atol=1e-6)
@@ -192,13 +195,6 @@ def test_between_the_breaks_of_a_bump_its_curvature_does_not_jump(body):
         assert (
             jumps[~near, k].max() < 0.05 * max(np.abs(np.diff(theta[:, k], 2)).max(), 1e-20) / h**2
         )
-
-
-@each_body
-def test_turning_is_the_derivative_of_the_tangent_angle_in_the_shape(body):
-    (q, rates, _), s, h = shapes(body), np.linspace(0, 1, 1501)[:, None] * np.ones(3), 1e-6
-    moved = (body.tangent(s, q + h * rates) - body.tangent(s, q - h * rates)) / (2 * h)
-    assert_allclose(body.turning(s, q, rates), moved, atol=1e-5 * max(np.abs(moved).max(), 1.0))
 
 
 @pytest.mark.parametrize(
