@@ -168,6 +168,8 @@ def test_progress_is_told_and_printed_only_if_asked(capsys):
     found = colloc.multistart(QUICK, 2, progress=outcomes.append)
     assert {o.start for o in outcomes} == {0, 1}
     assert found.optima[0].best.efficiency == max(o.efficiency for o in outcomes)
+    for start, known in ((None, found.optima[0].best), (1, outcomes[1])):
+        assert found.solution(start).efficiency == pytest.approx(known.efficiency, rel=1e-4)
     assert capsys.readouterr().out == ""
     slippery = QUICK.with_(friction=colloc.Friction(10, 10, 10))  # values in its own units
     colloc.solve(slippery, starts=4, verbose=True)

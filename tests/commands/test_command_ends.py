@@ -1,5 +1,4 @@
-"""Commands end in a sentence and an exit code: early Ctrl-C, full disks, encodings, odd names, broken
-caches; without a home, a language or a place to keep code."""
+"""Commands end in a sentence and an exit code: Ctrl-C, full disks, encodings, odd names, no home."""
 
 import io
 import json
@@ -42,6 +41,35 @@ needs_bash = pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
 OK = (0, 4)
 """Solved; certified or not, at so large a delta."""
 LETTERS = "# Länge der Schlange: µ_t = 1" + QUICK
+WIDE = """
+from colloc import *
+import numpy as np
+t = np.arange(30000) / 30000 * 2 * np.pi
+PROBLEM = Problem("wide", Corners(np.array([np.cos(t), np.sin(t)]), "none"), gait=Polygon(8, "none"))
+"""
+PRINTING = """
+print("hello from the file")
+from colloc import *
+from colloc.gaits import gait_fields
+class Talkative(Chain):
+    def describe(self):
+        print("hello from the body")
+        return super().describe()
+gait_fields.BODIES.append(Talkative)
+"""
+ONE_AFTER_ANOTHER = """
+from colloc import *
+FLOOR = Friction(mu_t=4, mu_f=1, mu_b=1)
+PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=FLOOR, delta=3e-3, mesh_tolerance=1e-4)
+"""
+PARETO = ["--points", "2", "--objectives", "speed", "efficiency"]
+SEVERAL = {"steer": ["--turn", "10"], "pareto": PARETO}
+NO_LANGUAGE = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"}
+# CasADi before 3.8 ends the process where Python cannot read the name of the folder that it is in
+if casadi.__file__.isascii() or [*map(int, casadi.__version__.split(".")[:2])] >= [3, 8]:
+    NO_LANGUAGE["PYTHONUTF8"] = "0"
+NO_CACHE = {"XDG_CACHE_HOME": "/proc/nowhere", "MPLCONFIGDIR": "/proc/nowhere"}
+OF_A_USER = ("HOME", "USER", "LOGNAME", "XDG_CACHE_HOME", "LANG")
 
 
 @pytest.fixture
@@ -82,8 +110,7 @@ def python(*words, stdout=subprocess.PIPE, **options):
     ],
 )  # fmt: skip
 def test_ctrl_c_while_libraries_are_imported_leaves_no_traceback(module, words, quick, tmp_path):
-    """The signal comes from inside the import; at numpy as in a dataclass that is made, where
-    Python would end the process by the signal, whatever the command returned."""
+    """From inside the import; at numpy as in a dataclass, where Python would end by the signal."""
     pressed = "import signal; signal.raise_signal(signal.SIGINT)"
     (tmp_path / "library").mkdir()
     library = tmp_path / "library" / f"{module}.py"
@@ -278,32 +305,12 @@ def test_an_interrupted_command_leaves_no_workers_behind():
     assert working.exitcode is not None
 
 
-WIDE = """
-from colloc import *
-import numpy as np
-t = np.arange(30000) / 30000 * 2 * np.pi
-PROBLEM = Problem("wide", Corners(np.array([np.cos(t), np.sin(t)]), "none"), gait=Polygon(8, "none"))
-"""
-
-
 @pytest.mark.parametrize("text", [QUICK + f"# {'x' * 2**20}\n", WIDE], ids=["file", "description"])
 def test_what_results_could_not_keep_is_refused_before_the_search(text, solve, monkeypatch):
     monkeypatch.setattr("colloc.studies.solve.resume", lambda *_, **__: pytest.fail("searched"))
     code, _, complaint = solve(text=text)
     assert code == 2
     assert re.search(r"\.py.* has \d{7} bytes, and results keep at most 1048576", complaint)
-
-
-PRINTING = """
-print("hello from the file")
-from colloc import *
-from colloc.gaits import gait_fields
-class Talkative(Chain):
-    def describe(self):
-        print("hello from the body")
-        return super().describe()
-gait_fields.BODIES.append(Talkative)
-"""
 
 
 def test_what_a_problem_file_and_its_parts_print_does_not_spoil_the_one_object(solve, monkeypatch):
@@ -361,15 +368,6 @@ def test_without_compiled_code_it_is_said_once_that_all_is_slower(quick, tmp_pat
     assert complaint.count("\n") == 1
 
 
-ONE_AFTER_ANOTHER = """
-from colloc import *
-FLOOR = Friction(mu_t=4, mu_f=1, mu_b=1)
-PROBLEM = Problem("p", gait=Harmonic(1, "bilateral"), friction=FLOOR, delta=3e-3, mesh_tolerance=1e-4)
-"""
-PARETO = ["--points", "2", "--objectives", "speed", "efficiency"]
-SEVERAL = {"steer": ["--turn", "10"], "pareto": PARETO}
-
-
 @pytest.mark.parametrize("name", SEVERAL)
 def test_an_interrupted_command_goes_on_from_its_last_problem(name, tmp_path, monkeypatch, capsys):
     (tmp_path / "p.py").write_text(ONE_AFTER_ANOTHER, encoding="utf-8")
@@ -411,14 +409,6 @@ def place(tmp_path):
     folder.mkdir()
     (folder / "quick.py").write_text(LETTERS, encoding="utf-8")
     return folder
-
-
-NO_LANGUAGE = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"}
-# CasADi before 3.8 ends the process where Python cannot read the name of the folder that it is in
-if casadi.__file__.isascii() or [*map(int, casadi.__version__.split(".")[:2])] >= [3, 8]:
-    NO_LANGUAGE["PYTHONUTF8"] = "0"
-NO_CACHE = {"XDG_CACHE_HOME": "/proc/nowhere", "MPLCONFIGDIR": "/proc/nowhere"}
-OF_A_USER = ("HOME", "USER", "LOGNAME", "XDG_CACHE_HOME", "LANG")
 
 
 def solved_and_verified(place, words, without, environment):

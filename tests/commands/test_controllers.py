@@ -20,6 +20,17 @@ PULSES = {
     "--neutral 2048 --scale 11.378": (2048, 11.378, (1, 1), (-np.inf, np.inf)),
     f"--scale 8 10 --neutral 1500 1480 {CLAMP}": ((1500, 1480), (8, 10), (1, 1), CLAMPED),
 }
+PRINTING = """
+#include <stdio.h>
+#include "{file}"
+int main(void) {{
+  printf("%d %g %g\\n", x_joints, x_rate_hz, x_period_s);
+  for (int k = 0; k < x_ramp_samples; k++) printf("%.9g %.9g\\n", (double)x_ramp[k][0], (double)x_ramp[k][1]);
+  for (int k = 0; k < x_cycle_samples; k++)
+    printf("%.9g %.9g\\n", (double)x_cycle[k][0], (double)x_cycle[k][1]);
+  return 0;
+}}
+"""
 
 
 @pytest.fixture
@@ -89,19 +100,6 @@ def test_a_message_of_ros_begins_and_ends_straight_at_rest_with_the_gait_between
     mean = 0.5 * (speeds[:, 1:] + speeds[:, :-1])
     np.testing.assert_allclose(np.diff(angles) * 25, mean, atol=0.03 * np.abs(speeds).max())
     assert np.abs(speeds).max() < 1.001 * np.abs(fast).max()
-
-
-PRINTING = """
-#include <stdio.h>
-#include "{file}"
-int main(void) {{
-  printf("%d %g %g\\n", x_joints, x_rate_hz, x_period_s);
-  for (int k = 0; k < x_ramp_samples; k++) printf("%.9g %.9g\\n", (double)x_ramp[k][0], (double)x_ramp[k][1]);
-  for (int k = 0; k < x_cycle_samples; k++)
-    printf("%.9g %.9g\\n", (double)x_cycle[k][0], (double)x_cycle[k][1]);
-  return 0;
-}}
-"""
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")

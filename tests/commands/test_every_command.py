@@ -1,5 +1,4 @@
-"""What holds for every command alike: refusals in one sentence or one JSON object, help, completion,
-exit codes, and failed solves that harm nothing."""
+"""For every command alike: refusals in one sentence or one JSON object, help, completion, codes."""
 
 import json
 import os
@@ -172,12 +171,15 @@ def test_bad_problems_get_one_clear_sentence_and_exit_code_two(text, tmp_path, c
 def test_a_good_problem_is_solved_saved_and_drawn(tmp_path, capsys):
     known = "REFERENCE = Reference(0.3, 0.1, 'a paper')\n"
     (tmp_path / "p.py").write_text(GOOD + known, encoding="utf-8")
-    assert colloc(["solve", f"{tmp_path}/p.py", "--output", f"{tmp_path}/out", "--pdf"]) == 0
+    assert (
+        colloc(["solve", f"{tmp_path}/p.py", "--output", f"{tmp_path}/out", "--pdf", "--dry"]) == 0
+    )
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"quick.h5", "quick.png", "quick.pdf"}
     printed = capsys.readouterr().out
     assert "efficiency d/W" in printed
     assert "a paper" in printed
+    assert "dry friction    between 0." in printed
     assert "delta had to be lowered from 0.3" in printed
 
 

@@ -1,6 +1,5 @@
-"""The problem file that `colloc init` writes: of links and a robot in SI units, whatever units are
-typed; and of a robot's own file, URDF or MJCF, with links, masses, limits and signs as computed by
-hand, what colloc exports read back, and what is no planar chain refused by name."""
+"""The problem file that `colloc init` writes: in whatever units a robot is typed; of URDF and MJCF as
+computed by hand, what colloc exports read back, and what is no planar chain refused by name."""
 
 from __future__ import annotations
 
@@ -29,6 +28,26 @@ THERE = {
 
 
 QUICK = [("urdf", "strips"), ("xml", "weights"), ("urdf", "feet")]
+SWIMMER = """
+<mujoco>
+<compiler angle="degree"/>
+<default><geom type="capsule" size="0.01" mass="0.3"/><joint range="-100 100"/>
+<default class="weak"><joint range="-30 60"/></default></default>
+<worldbody>
+<geom type="plane" size="1 1 1"/>
+<body name="torso">
+<freejoint/>
+<geom fromto="0.19 0 0 0.01 0 0"/>
+<body name="mid" pos="0 0 0" euler="0 0 180">
+<joint name="rot2" axis="0 0 1"/>
+<geom fromto="0 0 0 0.2 0 0"/>
+<body name="back" pos="0.2 0 0">
+<joint name="rot3" class="weak" axis="0 0 1"/>
+<geom fromto="0.01 0 0 0.19 0 0"/>
+</body></body></body>
+</worldbody>
+</mujoco>
+"""
 
 
 def link(name, mass=0.1, at="0 0 0", more=""):
@@ -171,28 +190,6 @@ def test_wheels_and_pads_come_back_from_mjcf(tmp_path):
     solution = colloc.evaluate(problem, gait)
     solution.export(tmp_path / "robot.xml", period=4.0, length=0.8, mass=1.5)
     assert sorted(feet(read(tmp_path, None, kind="xml").body)) == sorted(feet(problem.body))
-
-
-SWIMMER = """
-<mujoco>
-<compiler angle="degree"/>
-<default><geom type="capsule" size="0.01" mass="0.3"/><joint range="-100 100"/>
-<default class="weak"><joint range="-30 60"/></default></default>
-<worldbody>
-<geom type="plane" size="1 1 1"/>
-<body name="torso">
-<freejoint/>
-<geom fromto="0.19 0 0 0.01 0 0"/>
-<body name="mid" pos="0 0 0" euler="0 0 180">
-<joint name="rot2" axis="0 0 1"/>
-<geom fromto="0 0 0 0.2 0 0"/>
-<body name="back" pos="0.2 0 0">
-<joint name="rot3" class="weak" axis="0 0 1"/>
-<geom fromto="0.01 0 0 0.19 0 0"/>
-</body></body></body>
-</worldbody>
-</mujoco>
-"""
 
 
 def test_an_mjcf_has_classes_degrees_and_capsules(tmp_path, capsys):

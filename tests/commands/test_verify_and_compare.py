@@ -1,5 +1,4 @@
-"""Results are checked again without CasADi and compared as paths; tampering and differences show.
-What a solve ends with: a few lines, and numbers that mean the same as everywhere else."""
+"""Results checked again without CasADi and compared as paths; and the few lines of a solve's end."""
 
 import json
 import re
@@ -17,6 +16,7 @@ from colloc import Chain, Fourier, Friction, Problem, Solution, ellipse, evaluat
 from colloc.commands import results as recheck
 from colloc.commands.solve import summary_dict, summary_lines
 from colloc.results import checks
+from colloc.results.checks import UNCERTIFIED
 from colloc.results.comparison import gait_distance
 from colloc.results.robot import joint_torques, limit_lines
 from tests.shared.cases import slow_but
@@ -96,6 +96,11 @@ def test_what_is_no_number_of_a_replay_is_held_against_it_too(three_link, tmp_pa
         file = save(replace(three_link, certificate=certificate), tmp_path / "x.h5")
         assert recheck.verify([str(file), "--json"]) == 4
         assert said in json.loads(capsys.readouterr().out)["complaint"]
+    known, failed = three_link.certificate, tuple(replace(each, value=np.inf) for each in checks)
+    now = replace(known, checks=failed)
+    assert "passed all checks, the new one does not" in recheck.disagreement(known, now)
+    assert recheck.disagreement(now, now) == ""
+    assert "holds no certificate" in recheck.disagreement(UNCERTIFIED, known)
 
 
 @pytest.mark.parametrize(

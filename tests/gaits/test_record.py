@@ -113,6 +113,8 @@ REFUSED = {
     "no number": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n2,", "\n2,E!", 1), r"line 32, column q1: .* is no number: mend it"),
     "a longer line": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n", ",1\n", 1) + "4,0,0,0\n",
         "line 2, has 5 cells, and the lines below have 4"),
+    "a longer line inside": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C).replace("\n", ",1\n", 2).replace(",1\n", "\n", 1), "line 3, has 5 cells, and the lines about it have 4"),
+    "one column": ("q1\n" + table(A), "has one column: at least two are needed"),
     "two records": ("t,q1,q2,q3\n" + 2 * table(SECONDS, A, B, C), "the times fall after line 61"),
     "names twice": (2 * ("t,q1,q2,q3\n" + table(SECONDS, A, B, C)), "line 62, names the columns again"),
     "commas for both": ("t,q1,q2,q3\n" + table(*(np.round(each + 0.1234, 6) for each in (SECONDS, A, B, C)), comma=True),

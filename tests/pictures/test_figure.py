@@ -1,5 +1,4 @@
-"""The figure of a solution can be read, no words over words, nothing cut off, and is drawn whatever
-backend and style the surroundings name, which it leaves as they are."""
+"""Figures can be read, nothing over words or cut off, whatever backend and style are named."""
 
 import os
 import subprocess

@@ -158,9 +158,7 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     shown = frames(solution := unsolved(problem), count=241, arrows=300)
     lengths = np.hypot(*np.diff(shown.ends, axis=1))
     np.testing.assert_allclose(lengths, np.full_like(lengths, 1 / n_link), atol=1e-12)
-    # the arrows are friction per length: their sum is the net force, which vanishes up to the
-    # midpoint rule; at collocation points only, between them z is interpolated: hence the loose
-    # bound on a mesh of eight intervals
+    # friction per length adds up to the net force, which vanishes but for z between mesh points
     total = shown.arrow.mean(axis=1)
     assert np.median(np.hypot(*total)) < 0.02
     velocity = np.gradient(shown.arrow_base, shown.motion.t, axis=2)

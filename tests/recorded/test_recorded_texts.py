@@ -213,9 +213,9 @@ def steer():
     spot = replace(family, turns=family.turns[:1], points=family.points[:1])
     family = replace(family, on_the_spot=spot)
     with patch("colloc.studies.families.steer", return_value=family) as asked:
-        colloc("steer", "loop.py", "--turn", "-10", "5", "--spot", "20", "--no-figure")
+        colloc("steer", "loop.py", "--turn", "-10", "5", "--spot", "20")
     how = {**asked.call_args[1], "progress": None}
-    return f"{asked.call_args[0][1]}, {how}\n{described(family.plot())}"
+    return f"{asked.call_args[0][1]}, {how}\n{family!r}\n{described(family.plot())}"
 
 
 def span(values):

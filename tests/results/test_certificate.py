@@ -238,8 +238,7 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly():
     found = extrapolated_limit(linear, [0.0, 0.0, 0.0])
     assert found[0] == pytest.approx(0.25, abs=1e-15)
     assert found[1] == pytest.approx(3e-4, rel=1e-9)
-    # other parts may hide the linear one in the last change, never by chance in both: what it
-    # leaves there is allowed for
+    # other parts may hide the linear one in the last change: what it leaves is allowed for
     hidden = extrapolated_limit([linear[0], linear[1], linear[1]], [0.0, 0.0, 0.0])
     assert hidden[1] == pytest.approx(3e-4, rel=1e-9)
     # the last value is moved by a ninth of the last change: so is what it may be wrong by

@@ -1,5 +1,4 @@
-"""On a robot: metres, kilograms and seconds, held against forces on dense points; joints that brake,
-the pace of a gait alone, slopes, and what an arc is."""
+"""On a robot, in metres, kilograms and seconds: forces on dense points, braking, pace, slopes, arcs."""
 
 import math
 from dataclasses import replace

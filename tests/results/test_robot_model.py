@@ -14,6 +14,12 @@ from tests.shared.cases import slow
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
 UNEVEN, MASSES, INERTIAS = (0.2, 0.5, 0.3), (0.3, 0.2, 0.5), (0.002, 0.006, 0.001)
+TURNED = tuple(
+    Wheel(k, 0.4, angle=s * (0.3, 1.5, 0.2)[k], offset=0.03 * s) for k in range(3) for s in (1, -1)
+)
+WHEELS = tuple(map(Wheel, range(3)))
+AXLES = tuple(Wheel(link, 0.4, rolling=0.05, axle=True) for link in range(3))
+PADS = tuple(Pad(link, 0.25, 0.75) for link in range(3))
 
 
 @pytest.fixture(scope="module")
@@ -111,8 +117,7 @@ def test_a_wheel_on_an_axle_resists_with_its_rolling_friction_at_its_radius(unso
 
 
 def played(path, gait, period, periods=2):
-    """Places of the centre of mass and of the tail [m] through the last of some periods of a file
-    in MuJoCo, as it is written: servos get the gait's angles."""
+    """Places [m] of centre of mass and tail in the last of some periods of a file in MuJoCo."""
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_path(str(path))
     data, steps = mujoco.MjData(model), round(period / model.opt.timestep)
@@ -124,14 +129,6 @@ def played(path, gait, period, periods=2):
         if k >= (periods - 1) * steps:
             places.append([data.subtree_com[1][:2].copy(), data.qpos[:2].copy()])
     return np.moveaxis(places, 0, -1)
-
-
-TURNED = tuple(
-    Wheel(k, 0.4, angle=s * (0.3, 1.5, 0.2)[k], offset=0.03 * s) for k in range(3) for s in (1, -1)
-)
-WHEELS = tuple(map(Wheel, range(3)))
-AXLES = tuple(Wheel(link, 0.4, rolling=0.05, axle=True) for link in range(3))
-PADS = tuple(Pad(link, 0.25, 0.75) for link in range(3))
 
 
 @pytest.mark.parametrize(

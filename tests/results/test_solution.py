@@ -1,5 +1,4 @@
-"""The solved problem: its interpolant, where it goes and turns, and what it is if it failed; the distance
-of a gait that is asked to turn is the chord of an arc, by every way to it."""
+"""The solved problem: where it goes and turns, by its interpolant and as the chord of an arc."""
 
 from dataclasses import replace
 
@@ -20,6 +19,16 @@ from colloc.verification.mesh_error import mesh_error
 from tests.shared.cases import cases
 
 SKEW = Fourier([0.3, -0.5], [[0.4], [0.9]], [[1.1], [-0.2]])
+DELTA = 0.3
+BODY, FRICTION = Chain(), colloc.Friction()
+GAIT = Fourier(np.array([0.4, 0.3]), np.array([[1.0], [0.2]]), np.array([[0.1], [1.0]]))
+FINE = {"delta": DELTA, "tolerance": 1e-8, "instants": 400}
+CASES = """
+series: gait=Harmonic(1)
+with inertia: gait=Harmonic(1), froude=0.05
+polygon of unequal friction: gait=Polygon(4), friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3)
+"""
+CASES = cases(CASES, globals())
 
 
 def test_a_turn_is_said_to_the_side_to_which_the_tail_link_turns_and_how_far_joints_swing():
@@ -115,8 +124,7 @@ def test_the_centre_of_mass_goes_round_a_circle_of_the_radius_that_is_stated(tur
     radii = np.hypot(*(ends - middle[:, None]))
     np.testing.assert_allclose(radii, radii[0], rtol=1e-7)
     np.testing.assert_allclose(np.hypot(*np.diff(ends)), turning.distance, rtol=1e-6)
-    # from any phase the arc is the same, and of all phases together the centre of mass is where the
-    # arc says
+    # from any phase the arc is the same, though the way is not
     t = np.linspace(0.0, 1.0, 2001)
     for begin in (0.0, 0.1, 0.45, 0.83):
         found = arc(turning.rotation, turning.sample(begin + t).centre)
@@ -144,12 +152,6 @@ def test_the_tour_of_the_readme_works_on_a_failed_solution_uncertified(three_lin
     assert replace(three_link, answer=other).status == "not converged"
 
 
-DELTA = 0.3
-BODY, FRICTION = Chain(), colloc.Friction()
-GAIT = Fourier(np.array([0.4, 0.3]), np.array([[1.0], [0.2]]), np.array([[0.1], [1.0]]))
-FINE = {"delta": DELTA, "tolerance": 1e-8, "instants": 400}
-
-
 def replayed(path=GAIT, turn=0.0):
     return replay(BODY, FRICTION, path, turn=turn, **FINE)
 
@@ -172,8 +174,7 @@ def on_a_dense_grid(path, n=4000):
 
     theta = integral(omega).real
     alpha, later = theta[-1], np.append(t, 1.0)
-    # periodic: what is seen from axes that turn evenly; its primitive times e^(i alpha t) is the
-    # place
+    # periodic from axes that turn evenly; its primitive times e^(i alpha t) is the place
     seen = np.exp(1j * (theta[:-1] - alpha * t)) * centre
     k = np.fft.fftfreq(n, 1 / n)
     loop = np.fft.ifft(np.fft.fft(seen) / (1j * (2 * np.pi * k + alpha)))
@@ -200,14 +201,6 @@ def test_the_chord_does_not_depend_on_the_phase_that_a_period_is_begun_at():
     chords, displacements = ([replayed(path, at).distance for path in begun] for at in (turn, 0.0))
     assert np.ptp(displacements) > 0.01 * max(displacements)
     np.testing.assert_allclose(chords, chords[0], rtol=1e-9)
-
-
-CASES = """
-series: gait=Harmonic(1)
-with inertia: gait=Harmonic(1), froude=0.05
-polygon of unequal friction: gait=Polygon(4), friction=Friction(mu_t=1.7, mu_f=1, mu_b=1.3)
-"""
-CASES = cases(CASES, globals())
 
 
 def stated(case, turn, intervals=24):

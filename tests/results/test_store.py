@@ -1,5 +1,4 @@
-"""Results files: round trip, plain h5py, changed by hand, refused by the disk; and how a result takes its
-place: what was there and is better, or another, is kept."""
+"""Results files: round trip, changed by hand, refused by the disk; and what is kept beside them."""
 
 import dataclasses
 import os

@@ -1,8 +1,8 @@
-"""What joints have to do, with inertia and without: identities of torques and powers; gaits of joints
-that cannot do everything, that are slow, or bend farther to one side than to the other; and optima
-against maxima of grid sweeps that this file does itself."""
+"""What joints have to do, with inertia and without; gaits of joints that are weak, slow or one-sided;
+and optima against maxima of grid sweeps that this file does itself."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ from colloc.mechanics.inertia import inertial_moments
 from colloc.reduced.program import ReducedProgram
 from colloc.results.robot import joint_torques as sheet_torques
 from colloc.results.robot import limit_lines as lines
+from colloc.search.confirm import explanation
 from colloc.search.iterate import space_near
 from colloc.search.options import OPTIONS
 from colloc.search.solve import solve
@@ -31,6 +32,36 @@ BODY, LAW = Chain((0.2, 0.5, 0.3), weights=(0.3, 0.3, 0.4)), Friction(mu_t=1.7, 
 USUAL = Problem("limited", colloc.ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"))
 EASY = Friction(mu_t=3, mu_f=1, mu_b=1)
 ONE_SIDED = ((-0.6, 1.5), (-1.5, 0.6))
+HOPELESS = {
+    "power": (
+        {"power_limit": 0.005},
+        r"power of joint \d is 0\.005 weight x body length per period",
+    ),
+    "torque": (
+        {"torque_limit": 0.01},
+        r"torque of joint \d is 0\.01 weight x body length, and .* 5",
+    ),
+    "far": ({"power_limit": 0.1, "at_least": {"distance": 0.3}}, r"power of joint \d is 0\.1 "),
+}
+CHAIN = Chain((0.3, 0.25, 0.45))
+FLOOR = Friction(mu_t=1.3, mu_f=0.7, mu_b=1.1)
+GAIT = Fourier([0.3, -0.2], cos=[[0.6, 0.1], [0.3, 0.2]], sin=[[0.2, 0.3], [0.7, -0.1]])
+DELTA, FROUDE = 0.05, 0.3
+T = np.linspace(0, 1, 20001)
+FAR = {"objective": "distance", "friction": Friction(mu_t=2, mu_f=1, mu_b=1.5)}
+
+
+CASES = """
+harmonics: gait=Harmonic(2, "bilateral"), speed_limit=(8.0, 8.0), delta=1e-2, **FAR
+splines: gait=BSpline(8, symmetry="bilateral"), speed_limit=8.0, **FAR
+serpenoid: gait=Serpenoid(1), speed_limit=3.0, body=Chain((0.2,) * 5), friction=ROUGH, delta=1e-2
+inertia: gait=Harmonic(1, "antipodal"), speed_limit=10.0, froude=0.05
+slope: gait=Harmonic(1), speed_limit=6.0, grade=0.05, friction=UNEVEN, objective="distance"
+"""
+ROUGH, UNEVEN = Friction(mu_t=3), Friction(mu_t=3, mu_f=1, mu_b=1.5)
+CASES = cases(CASES, globals())
+DRY = 1e-4
+LYING, FRICTION = Chain(), Friction()
 
 
 def moments(body, law, angles, rates, delta):
@@ -118,8 +149,7 @@ def weak():
 
 
 def test_the_replay_tells_the_largest_torques_and_powers(free):
-    # the best ellipse of three equal links swings an end link broadside, and so does every other of
-    # its class
+    # every ellipse of three equal links swings an end link broadside
     torques, powers = np.split(replay(Chain(), Friction(), free.gait, 1e-4, limits=ONE).shares, 2)
     np.testing.assert_allclose(torques, 1 / 18, rtol=1e-4)
     assert powers[0] == pytest.approx(powers[1], rel=1e-4)
@@ -180,19 +210,6 @@ def test_a_middle_joint_may_be_weaker_than_the_best_gait_wants_and_multipliers_p
     assert gained / 1e-3 == pytest.approx(price, rel=0.05)
 
 
-HOPELESS = {
-    "power": (
-        {"power_limit": 0.005},
-        r"power of joint \d is 0\.005 weight x body length per period",
-    ),
-    "torque": (
-        {"torque_limit": 0.01},
-        r"torque of joint \d is 0\.01 weight x body length, and .* 5",
-    ),
-    "far": ({"power_limit": 0.1, "at_least": {"distance": 0.3}}, r"power of joint \d is 0\.1 "),
-}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("case", HOPELESS)
 def test_where_no_start_keeps_the_limits_the_search_ends_soon_and_says_what_is_missed(case):
@@ -205,10 +222,20 @@ def test_where_no_start_keeps_the_limits_the_search_ends_soon_and_says_what_is_m
     assert "None of 8 starts led to a gait of the class that keeps the limits" in found.message
 
 
-CHAIN = Chain((0.3, 0.25, 0.45))
-FLOOR = Friction(mu_t=1.3, mu_f=0.7, mu_b=1.1)
-GAIT = Fourier([0.3, -0.2], cos=[[0.6, 0.1], [0.3, 0.2]], sin=[[0.2, 0.3], [0.7, -0.1]])
-DELTA, FROUDE = 0.05, 0.3
+def test_a_limit_that_is_not_kept_is_named_with_its_joint_its_size_and_its_unit():
+    limits = {"torque_limit": (0.1, 0.2), "power_limit": (0.3, 0.4)}
+    program = program_of(Problem("limited", gait=Harmonic(1), intervals=6, **limits))
+    for which, most in enumerate((0.1, 0.2, 0.3, 0.4)):
+        limit = (
+            f"{('torque', 'power')[which // 2]} of joint {which % 2 + 1} is {most} weight x body"
+        )
+        limit += " length" + " per period" * (which > 1)
+        excess = np.zeros(program.row_lower.size)
+        excess[program.groups[ACTUATORS].start + 4 * 5 + which] = 0.5
+        ended = SimpleNamespace(excess=excess, iterations=7, status="Ended")
+        when = f"at phase {program.mesh.times[5]:.3f}"
+        said = f"the limit on the {limit}, and the gait needs 1.5 times as much {when} (Ended)"
+        assert said in explanation(program, ended, 0.1)
 
 
 def states(n):
@@ -265,21 +292,6 @@ def test_a_gait_whose_motors_limit_it_is_certified_and_uses_all_that_it_may():
     assert again.value == pytest.approx(weak.value, rel=1e-5)
     beyond = evaluate(problem, strong.gait)
     assert [check.name for check in beyond.certificate.failures] == ["actuators"]
-
-
-T = np.linspace(0, 1, 20001)
-FAR = {"objective": "distance", "friction": Friction(mu_t=2, mu_f=1, mu_b=1.5)}
-
-
-CASES = """
-harmonics: gait=Harmonic(2, "bilateral"), speed_limit=(8.0, 8.0), delta=1e-2, **FAR
-splines: gait=BSpline(8, symmetry="bilateral"), speed_limit=8.0, **FAR
-serpenoid: gait=Serpenoid(1), speed_limit=3.0, body=Chain((0.2,) * 5), friction=ROUGH, delta=1e-2
-inertia: gait=Harmonic(1, "antipodal"), speed_limit=10.0, froude=0.05
-slope: gait=Harmonic(1), speed_limit=6.0, grade=0.05, friction=UNEVEN, objective="distance"
-"""
-ROUGH, UNEVEN = Friction(mu_t=3), Friction(mu_t=3, mu_f=1, mu_b=1.5)
-CASES = cases(CASES, globals())
 
 
 @pytest.mark.parametrize("case", slow_but(["harmonics", "serpenoid"], CASES))
@@ -347,10 +359,6 @@ def test_polygons_keep_both_sides_use_them_and_mirror():
 
 def test_a_range_that_is_even_is_a_limit():
     assert problem(((-1, 1), 2.0)).joint_limit == problem((1.0, 2.0)).joint_limit
-
-
-DRY = 1e-4
-LYING, FRICTION = Chain(), Friction()
 
 
 def efficiencies(A, n):

@@ -1,5 +1,4 @@
-"""A gait of one's own: whatever way the angles are given, what comes out is what a replay of them
-says."""
+"""A gait of one's own: however the angles are given, what comes out is what their replay says."""
 
 import re
 
@@ -50,8 +49,7 @@ def test_delta_at_unit_shape_speed_becomes_that_of_the_gait_in_a_period():
 
 
 def filmed(path, time, lengths=LINKS, names="x_{} y_{}", sway=0.0):
-    """Points of a body of 250 pixels with the gait, whose centre goes 0.05 of its length a period,
-    but for a sway in two periods."""
+    """Points of a body of 250 pixels, which goes 0.05 of it a period, but for a sway in two."""
     turns = np.vstack([0 * time, np.cumsum(GAIT.angles(time), axis=0)])[: len(lengths)]
     links = np.array(lengths)[:, None] * np.exp(1j * (turns + 0.4 * np.sin(2 * np.pi * time)))
     points = np.vstack([0 * time, np.cumsum(links, axis=0)])
@@ -268,6 +266,10 @@ def test_errors_of_samples_are_in_units_of_friction_and_kept_and_no_disagreement
     by_friction = loaded.certificate.of_samples * np.array([0.01, 0.01, 1.0, 100.0])
     np.testing.assert_allclose(rough.certificate.of_samples, by_friction, rtol=1e-3)
     assert main(["verify", str(path), "--quiet"]) == 0
+    # of motors, too, whatever turn of theirs is one of a joint, but for what is tried at random
+    geared = QUICK.with_(gait=colloc.Coupled(colloc.Harmonic(1), gears=((0, -2), (1, 0))))
+    driven = colloc.evaluate(geared, noisy[::-1] * [[1.0], [-0.5]]).certificate.of_samples
+    np.testing.assert_allclose(driven, loaded.certificate.of_samples, rtol=0.1)
 
 
 def test_an_exported_gait_states_no_error_of_its_samples_whatever_its_columns(exact, tmp_path):

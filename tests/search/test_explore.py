@@ -110,8 +110,7 @@ def test_the_answer_does_not_depend_on_what_the_search_is_given(given):
 
 
 def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkeypatch):
-    """However good it is: links that pass through each other as delta falls went on to be refined
-    on ten thousand intervals."""
+    """Links that pass through each other as delta falls went on to ten thousand intervals."""
     follow = explore.follow
     monkeypatch.setattr(explore, "follow", lambda *at: replace(follow(*at), violation=0.5))
     with pytest.raises(colloc.NotConvergedError, match="no gait could be followed"):
@@ -215,8 +214,7 @@ def test_in_slow_motion_the_work_is_that_against_friction_and_motors_have_no_lim
 def test_gaits_are_solved_for_until_one_holds_and_none_promises_more(
     monkeypatch, ends, solved_for, first
 ):
-    """Gaits promise 1, 0.9, 0.8, 0.7 before their meshes are refined; before the first of these
-    that are tried, the body does not move as promised."""
+    """They promise 1, 0.9, 0.8, 0.7; before the first tried, the body does not move as promised."""
     asked = []
 
     def finish(problem, optimum):

@@ -1,5 +1,4 @@
-"""The pace of a gait sought with it, where time is worth something: against fixed paces, and what
-cannot be asked; and gaits with inertia on a slope: the limits slow and level, and from rest."""
+"""The pace of a gait sought with it, against fixed paces; gaits with inertia on a slope."""
 
 from dataclasses import replace
 
@@ -42,8 +41,7 @@ def best(stated):
 
 
 def test_the_best_pace_is_that_of_the_best_fixed_one():
-    """Between slow, where standing takes most, and fast, where inertia does; and by the envelope
-    theorem the value of the best gait is stationary in the pace."""
+    """Between slow, where standing takes most, and fast; there the value is stationary in it."""
     found = best(problem(colloc.Free(0.01, 1.0)))
     froude = played(found)
     assert found.optimal

@@ -1,5 +1,4 @@
-"""Friction from motion: what moved under known coefficients is found to, within the stated errors;
-what a motion does not tell is said."""
+"""Friction from motion, within the stated errors; what a motion does not tell is said."""
 
 import json
 from types import SimpleNamespace
@@ -27,8 +26,7 @@ def crawled():
 def recorded(
     path, solution, seed=0, noise=2e-3, periods=2.0, per_period=100, point="", length=1.0, lasts=1
 ):
-    """A record of joint angles and of places of a point, from a camera that stands somewhere, whose
-    noise lasts for so many samples."""
+    """Angles and places of a point, from a camera somewhere; noise lasts for so many samples."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(periods * per_period)) / per_period
     motion = solution.sample(t)
@@ -266,6 +264,18 @@ def test_the_command_prints_what_to_write_into_the_problem_file(crawled, tmp_pat
         assert each == pytest.approx(scaled[name], rel=1e-3)
     with pytest.raises(colloc.ProblemError, match="leave mu_forward out"):
         colloc.identify(FLOOR.with_(froude=0.05), tmp_path / "a.csv", mu_forward=0.3)
+
+
+def test_what_the_motion_does_not_tell_apart_is_named():
+    """Slow motion leaves a factor of all open: all but one change as that one does back."""
+    stated = SimpleNamespace(names=["mu_t", "mu_f", "mu_b"], free=[0, 2], only_ratios=True)
+    for direction, said in (
+        ((0.1, 1.0), "mu_b from mu_t and mu_f: it does not change the motion."),
+        ((1.0, 1.0), "mu_f from mu_t and mu_b: it does not change the motion."),
+        ((1.0, -1.0), "mu_t and mu_b: the motion is the same with mu_t +11 %, mu_b -10 %."),
+    ):
+        found = _Fit.describe(stated, np.array(direction))
+        assert found == f"This gait cannot distinguish {said}"
 
 
 def test_a_record_without_a_path_is_refused(tmp_path):

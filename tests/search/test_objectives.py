@@ -1,6 +1,5 @@
-"""Other things than efficiency to be best at: optima that the replay confirms, and what must be
-reached; of friction only the ratios of coefficients matter: their size is a unit. An objective is
-one expression: the same value, gradient and symbol for all who ask; nothing of a file is executed."""
+"""Other things than efficiency to be best at, and what must be reached; friction's size is a unit.
+An objective is one expression for all who ask; nothing of a file is executed."""
 
 import pickle
 from dataclasses import replace

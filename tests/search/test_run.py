@@ -1,5 +1,4 @@
-"""What a run keeps: everything between stages, exactly; so an interrupted solve ends as if nothing
-had happened, and what other processes compute ahead changes nothing."""
+"""What a run keeps: an interrupted solve, or one with helpers, ends as if nothing had happened."""
 
 import functools
 import os
@@ -22,7 +21,7 @@ from colloc import BSpline, Chain, Friction, Harmonic, ModalBody, Polygon, Probl
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import is_visible, on_speed_floor
 from colloc.search import checkpoint as ahead
-from colloc.search.checkpoint import ROWS, STAGES, Ahead, Run
+from colloc.search.checkpoint import ROWS, STAGES, Ahead, Run, active_run
 from colloc.search.explore import explore, first_optimum, sketch
 from colloc.search.optimise import descend
 from colloc.search.options import SearchOptions
@@ -143,7 +142,9 @@ def test_nothing_is_computed_twice_however_often_a_solve_is_interrupted(tmp_path
 
 
 @pytest.mark.parametrize("shrinking", [False, True])
-def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_be(shrinking):
+def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_be(
+    shrinking, monkeypatch
+):
     found = solve(QUICK.with_(delta=1e-3, mesh_tolerance=1e-5), 1)
     assert found.success
     tiny = {"gait": found.gait.scaled(0.01), "value": 1.1 * found.answer.value}
@@ -162,6 +163,13 @@ def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_b
     failed = replace(found, answer=replace(found.answer, value=9.0, optimal=False), message="why")
     said = choose(found.problem, [failed, found]).message
     assert "A gait of 9.0000 is not verified: why" in said
+
+    def stopped(*at):
+        active_run().solutions += [failed, found]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("colloc.search.solve._solve", stopped)
+    assert solve(QUICK, 1).answer is found.answer  # the best that holds
 
 
 def stage(number):
@@ -257,8 +265,7 @@ def test_a_solve_on_a_full_disk_prints_its_answer_and_keeps_what_was_there(undis
 
 @pytest.mark.parametrize("thread", ["main", "worker"])
 def test_time_that_is_over_gives_the_best_gait_so_far(thread):
-    """In a worker too, which no signal reaches: twenty links spend half a minute of the processor
-    before SQP first asks. A machine that is busy with other things makes no difference."""
+    """Twenty links spend half a minute before SQP first asks; no signal reaches a worker."""
     links = 20
     problem = Problem("long", body=Chain((1 / links,) * links), gait=Harmonic(1, "antipodal"))
     begin, found = time.process_time(), []

@@ -57,8 +57,7 @@ def test_only_what_holds_the_gait_back_has_a_price(found, three_link):
 
 
 def differences(solution, parameter, step):
-    """Derivative of the certified best value by sought gaits, with the step and half of it, and its
-    error; one-sided where the number cannot grow."""
+    """Derivative of the best value by gaits sought again, one-sided at an end, and its error."""
     some = sensitivity(solution, resolve=True, change=step)[parameter].again
     half = sensitivity(solution, resolve=True, change=step / 2)[parameter].again
     assert all(each.status == "solved" for each in (*some, *half))
@@ -107,8 +106,7 @@ def test_slopes_on_a_finer_mesh_differ_by_no_more_than_the_errors(name, finer, s
 
 
 def test_a_slope_that_changes_with_the_step_is_off_by_at_most_its_error(three_link, monkeypatch):
-    """As where something else begins within a few steps: the derivative at the number itself is
-    that of friction sideways."""
+    """Something else begins within a few steps; at the number itself it is the plain slope."""
     plain = {each.name: each for each in parameters(three_link.problem)}["friction sideways"]
     bent = replace(plain, name="bent", changed=lambda step: plain.changed(step + 1e8 * step**3))
     monkeypatch.setattr("colloc.search.sensitivity.parameters", lambda problem: [plain, bent])
@@ -164,9 +162,15 @@ def test_a_path_on_file_is_replayed_at_delta_at_unit_shape_speed_and_for_its_tur
 
 def test_a_gait_that_exceeds_a_limit_or_turns_says_so(three_link, of):
     of("joint limit")
-    (less,) = three_link.sensitivity(resolve=True)["joint limit"].again
+    slopes = three_link.sensitivity(resolve=True)
+    (less,) = slopes["joint limit"].again
     assert "beyond its limits" in less.breaks
     assert less.value < three_link.value
+    first = slopes.value - 0.1 * slopes["joint limit"].slope
+    numbers = [f"{x:.4f}" for x in (first, less.value, less.kept)]
+    assert str(slopes).split()[-11:-4] == ["limit", "-10", "%", *numbers, f"{less.behind:.1e}"]
+    (told,) = slopes.facts()["effects"][0]["again"]
+    assert (told["kept"], told["behind"]) == (less.kept, less.value - less.kept)
 
 
 @pytest.mark.parametrize(("part", "says"), [(1.05, "distance 0.2679, not 0.2813"), (0.95, "")])

@@ -1,5 +1,4 @@
-"""Problems on a slope: the collocated motion against the differential equation; solved, certified, kept
-and shown like any other; no gait or heading beside the one found is better."""
+"""Problems on a slope: motion by the differential equation, solved, certified, kept; none is better."""
 
 import numpy as np
 import pytest
@@ -26,6 +25,20 @@ AT = {"gait": Harmonic(1, "bilateral"), "delta": 1e-2, "grade": 0.1}
 PROBLEM = Problem("climber", ellipse(0, 2.8, 1.3), **AT)
 SIDES = PROBLEM.with_(name="sides", gait=Polygon(4), delta=6e-4, delta_start=None, intervals=None)
 """About as dry: the path is 17 rad long."""
+LEVEL = Problem("bilateral", gait=Harmonic(1, "bilateral"), grade=0.4, intervals=60)
+SKEW = Problem(
+    "skew", body=Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)),
+    friction=colloc.Friction(mu_t=1.7, mu_b=1.3), gait=Harmonic(2), grade=0.4,
+    intervals=60,
+)  # fmt: skip
+PARTS = {
+    "feet": (colloc.Foot(0), Pad(1, 0.1, 0.6), colloc.Wheel(2, rolling=0.5)),
+    "masses": (0.4, 0.3, 0.3),
+}
+FEET = SKEW.with_(name="feet", body=Chain((0.2, 0.5, 0.3), **PARTS), grade=0.2, towards=0.5)
+SPLINE = SKEW.with_(name="spline", gait=BSpline(7, degree=3), guess=None)
+PATHS = SKEW.with_(name="sides", gait=Polygon(5), guess=None)
+FLAT = {"grade": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -183,22 +196,6 @@ def test_a_slope_that_is_not_climbed_is_said_so():
 
 def bump(t):
     return np.exp(np.cos(2 * np.pi * t))
-
-
-LEVEL = Problem("bilateral", gait=Harmonic(1, "bilateral"), grade=0.4, intervals=60)
-SKEW = Problem(
-    "skew", body=Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3)),
-    friction=colloc.Friction(mu_t=1.7, mu_b=1.3), gait=Harmonic(2), grade=0.4,
-    intervals=60,
-)  # fmt: skip
-PARTS = {
-    "feet": (colloc.Foot(0), Pad(1, 0.1, 0.6), colloc.Wheel(2, rolling=0.5)),
-    "masses": (0.4, 0.3, 0.3),
-}
-FEET = SKEW.with_(name="feet", body=Chain((0.2, 0.5, 0.3), **PARTS), grade=0.2, towards=0.5)
-SPLINE = SKEW.with_(name="spline", gait=BSpline(7, degree=3), guess=None)
-PATHS = SKEW.with_(name="sides", gait=Polygon(5), guess=None)
-FLAT = {"grade": 0.0}
 
 
 def program_at(problem, delta):

@@ -1,6 +1,5 @@
-"""Families of gaits. A front of two objectives: no gait of it is better in both, and its ends are the
-best by one alone. Gaits that steer: certified at every turn, and between two of them a controller can
-interpolate."""
+"""Families of gaits: fronts of two objectives, none better in both, their ends the best by one alone;
+gaits that steer, certified at every turn, between which a controller can interpolate."""
 
 import json
 from dataclasses import replace
@@ -26,6 +25,18 @@ PROBLEM = Problem("wide", friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=1e-2
 
 LONG = PROBLEM.with_(at_least={"length": 9.0})
 """Without it the gaits are 7.3 to 8.3 radians long."""
+ONE_FLOOR = """
+from colloc import *
+PROBLEM = Problem("floor", friction=Friction(mu_t=10, mu_f=1, mu_b=1), gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-4)
+"""
+
+
+EASY = {"gait": Harmonic(1, "bilateral"), "friction": Friction(mu_t=4, mu_f=1, mu_b=1)}
+STRAIGHT = Problem("p", delta=1e-2, mesh_tolerance=1e-4, **EASY)
+TURNS = np.radians([-10, 0, 10])
+STUCK = {"gait": colloc.Coupled(Harmonic(1), stuck={1: 0.5}), "guess": None}
+STUCK |= {"body": Chain((0.2,) * 5), "friction": Friction(mu_t=2, mu_f=1, mu_b=1)}
+ASIDE = {"gait": Harmonic(1), "joint_limit": ((-1.5, 2.6),) * 2}
 
 
 @pytest.fixture(scope="module")
@@ -190,17 +201,6 @@ def test_solve_leaves_a_front_that_the_report_shows(tmp_path, monkeypatch, capsy
     assert "another problem, and left out" in capsys.readouterr().err
 
 
-ONE_FLOOR = """
-from colloc import *
-PROBLEM = Problem("floor", friction=Friction(mu_t=10, mu_f=1, mu_b=1), gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-4)
-"""
-
-
-EASY = {"gait": Harmonic(1, "bilateral"), "friction": Friction(mu_t=4, mu_f=1, mu_b=1)}
-STRAIGHT = Problem("p", delta=1e-2, mesh_tolerance=1e-4, **EASY)
-TURNS = np.radians([-10, 0, 10])
-
-
 @pytest.fixture(scope="module")
 def family():
     return steer(STRAIGHT, TURNS, starts=1)
@@ -233,28 +233,35 @@ def test_a_turn_to_the_right_is_the_mirror_image_of_that_to_the_left(family):
         assert getattr(right, name) == pytest.approx(getattr(left, name), rel=1e-4)
 
 
-@pytest.mark.slow
-def test_a_body_that_is_not_its_mirror_image_turns_to_both_sides():
-    body, friction = Chain((0.2,) * 5), Friction(mu_t=2, mu_f=1, mu_b=1)
-    bent = colloc.Coupled(Harmonic(1), stuck={1: 0.5})
-    problem = Problem("stuck", body=body, friction=friction, gait=bent, delta=1e-2)
-    assert steer(problem.with_(mesh_tolerance=1e-3), [-0.2, 0.2], starts=1).certified
+@pytest.mark.parametrize(("changes", "sign"), [({}, -1), (ASIDE, 1), (STUCK, 1)])
+def test_a_turn_is_sought_from_the_mirror_image_of_the_other_where_that_is_a_gait(
+    changes, sign, monkeypatch
+):
+    begun = []
+
+    def member(problem, starts):
+        begun.append(problem.guess.angles(np.arange(9) / 9))
+        return SimpleNamespace(success=True, gait=problem.guess)
+
+    monkeypatch.setattr(families, "solve_member", member)
+    steer(STRAIGHT.with_(**changes), [-0.2, 0.2])
+    np.testing.assert_allclose(begun[2], sign * begun[1], atol=1e-12)
+    bad = SimpleNamespace(success=False, message="It failed.")
+    monkeypatch.setattr(families, "solve_member", lambda *at: bad)
+    for find, what in ((steer, "the straight gait"), (pareto_front, "the gait of best efficiency")):
+        with pytest.raises(colloc.ProblemError, match=f"{what} is not verified, .* It failed"):
+            find(STRAIGHT, *([0.2],) * (find is steer))
 
 
 @pytest.mark.slow
-def test_with_one_sided_limits_both_sides_are_sought_from_the_straight_gait_and_keep_them():
-    """The mirror image of a gait within (-1.5, 2.6) need not be within it."""
-    straight, limits, turns = [], ((-1.5, 2.6), (-1.5, 2.6)), [-0.15, 0.15]
-    problem = STRAIGHT.with_(joint_limit=limits, gait=Harmonic(1), mesh_tolerance=1e-3)
-    family = steer(problem, turns, starts=2, progress=lambda *news: straight.append(news))
+@pytest.mark.parametrize("changes", [ASIDE, STUCK])
+def test_a_body_that_its_mirror_image_is_not_turns_to_both_sides_within_its_limits(changes):
+    turns = [-0.15, 0.15]
+    family = steer(STRAIGHT.with_(**changes, mesh_tolerance=1e-3), turns, starts=2)
     assert family.certified
-    assert straight[0][0] == 0
-    begun = straight[0][1].gait.angles(np.linspace(0, 1, 40))
     for point, turn in zip(family.points, turns, strict=True):
-        guess = point.problem.guess.angles(np.linspace(0, 1, 40))
-        np.testing.assert_allclose(guess, begun, atol=1e-12)
         angles = point.gait.angles(np.linspace(0, 1, 400))
-        assert -1.5 - 1e-6 < angles.min() < angles.max() < 2.6 + 1e-6
+        assert changes is not ASIDE or -1.5 - 1e-6 < angles.min() < angles.max() < 2.6 + 1e-6
         assert point.rotation == pytest.approx(turn, abs=0.01)
 
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partialmethod
 
 import numpy as np
 import pytest
@@ -46,6 +47,26 @@ CLASSES = {
     "triangle": colloc.Polygon(3, "bilateral"),
     "spline": colloc.BSpline(8, symmetry="bilateral"),
 }
+STUDY = """
+from colloc import Axis, Friction, Harmonic, ModalBody, Problem, Study
+
+def problem(mu_t):
+    body, gait = ModalBody(2, panels=4), Harmonic(1, "antipodal")
+    return Problem("modes", body=body, friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1), gait=gait, delta=0.02, intervals=8)
+
+STUDY = Study("modes", (Axis("mu_t", (100.0, 50.0)),), problem, cold_starts=0, warm_starts=1)
+"""
+
+
+PRESCRIBED = """
+from colloc import Axis, Friction, Problem, Study, Wave
+
+def problem(mu_t):
+    return Problem("waves", body=Wave("sine"), friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-3)
+
+PROBLEM = problem(100.0)
+STUDY = Study("waves", (Axis("mu_t", (100.0, 50.0)),), problem)
+"""
 
 
 def problem(x=1.0, y=1.0, kind="a"):
@@ -59,8 +80,7 @@ def grid(**changes):
 
 
 def landscape(stated, start_from, start, time_limit, **_):
-    """In place of a solve: two basins, parted by the amplitude of the first joint; only 0.9 of the
-    way is kept each time."""
+    """In place of a solve: two basins, by the amplitude of joint 1; 0.9 of the way is kept."""
     guess = start_from()
     good, law = guess.cos[0, 0] > 1.5, stated.friction
     if law.mu_t == 3.0 and law.mu_b == 2.0:
@@ -169,8 +189,7 @@ def test_what_is_found_does_not_depend_on_workers_or_on_who_is_faster(fake, tmp_
 
 
 def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypatch):
-    """Every cell has random starts of its own, of the study's seed, and its problem's guess; one
-    start of the last cell finds the good basin."""
+    """Cells have starts of their own, and their guess; one start of the last finds the basin."""
     numbers, rounds = [], {}
 
     def start(p, sampler, seed, k):
@@ -354,6 +373,7 @@ def test_xarray_opens_the_result_with_dimensions_units_and_texts(fake, tmp_path)
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         assert dict(data.sizes) == {"x": 3, "kind": 2, "joint": 2, "harmonic": 1}
         assert data.efficiency.sel(x=2.0, kind="bb").item() == table.variables["efficiency"][1, 1]
+        xarray.testing.assert_equal(table.to_xarray().efficiency, data.efficiency)
         assert data.x.attrs["long_name"] == "mu_t / mu_f"
         assert data.efficiency.attrs["units"] == "1/weight"
         assert list(data.kind.values) == ["ä", "bb"]
@@ -414,8 +434,7 @@ def test_a_class_says_how_a_path_turns_and_where_its_wave_runs():
     # joint 2 repeats joint 1 a quarter period later
     quarter = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [1.0]])
     back = Fourier([0, 0], [[1.0], [0.0]], [[0.0], [-1.0]])
-    # a small wave of twice the pace is as much as one of half its square: it runs twice about the
-    # mean, and back
+    # a small wave of twice the pace runs twice about the mean, and back
     both = Fourier([0.8, -0.5], [[1.0, 0.5], [0.0, 0.0]], [[0.0, 0.0], [1.0, -0.5]])
     twice = Fourier([0.8, -0.5], [[0.0, 0.5], [0.0, 0.0]], [[0.0, 0.0], [0.0, -0.5]])
     for gait, turns, wave in ((quarter, 1, 1), (back, -1, -1), (both, 1, 1 / 3), (twice, -2, -1)):
@@ -480,6 +499,24 @@ def test_the_name_of_a_gait_is_the_same_in_every_process():
     assert said == start_key(gait) != start_key(other)
 
 
+def test_the_command_says_what_it_found_and_goes_on_from_its_journal(
+    fake, tmp_path, monkeypatch, capsys
+):
+    run = partialmethod(StudyRun.run, executor=ThreadPoolExecutor)
+    monkeypatch.setattr(StudyRun, "run", run)
+    words = ["--output", f"{tmp_path}/", "--chunk", "2"]
+    for journal in (0, 2):
+        assert sweep_study([str(study_file(tmp_path)), *words]) == 0
+        said = capsys.readouterr().out
+        assert f"2 cells, {journal} of them in the journal\n" in said
+        assert ("round 0: 2 of 2, 0 s left)" in said) == (journal == 0)
+        assert f"tiny: 2 cells: 2 solved; saved {tmp_path}/tiny.nc" in said
+    assert load_study(tmp_path / "tiny.nc").attributes["source"] == FILE
+    none = FILE.replace("(1.0, 1.1)", "(3.0,)").replace("(1.0,)", "(2.0,)")
+    assert sweep_study([str(study_file(tmp_path, none)), *words, "--quiet"]) == 3
+    assert capsys.readouterr().out.startswith("tiny: 1 cells: 1 no verified gait; saved")
+
+
 @pytest.mark.slow
 def test_the_command_line_solves_resumes_and_certifies(tmp_path, capsys):
     out = tmp_path / "out put"
@@ -514,28 +551,6 @@ def test_ctrl_c_keeps_what_is_done_and_says_so(tmp_path):
     reported = sum("round 0" in line for line in [*lines, *rest.splitlines()])
     assert reported >= 2
     assert np.sum(load_study(tmp_path / "tiny.nc").variables["efficiency"] > 0) >= reported
-
-
-STUDY = """
-from colloc import Axis, Friction, Harmonic, ModalBody, Problem, Study
-
-def problem(mu_t):
-    body, gait = ModalBody(2, panels=4), Harmonic(1, "antipodal")
-    return Problem("modes", body=body, friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1), gait=gait, delta=0.02, intervals=8)
-
-STUDY = Study("modes", (Axis("mu_t", (100.0, 50.0)),), problem, cold_starts=0, warm_starts=1)
-"""
-
-
-PRESCRIBED = """
-from colloc import Axis, Friction, Problem, Study, Wave
-
-def problem(mu_t):
-    return Problem("waves", body=Wave("sine"), friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1), delta=1e-2, mesh_tolerance=1e-3)
-
-PROBLEM = problem(100.0)
-STUDY = Study("waves", (Axis("mu_t", (100.0, 50.0)),), problem)
-"""
 
 
 @pytest.mark.slow

@@ -1,10 +1,7 @@
-"""kill -9 at 120 random moments of a solve, a multi-start and a study: nothing that was finished is
-lost or broken.
+"""kill -9 at 120 random moments of a solve, a multi-start and a study: nothing finished is lost.
 
-A run is forked, and killed after a random time, or (every other cycle) within milliseconds of the
-moment a result begins to be written. It says what it has finished through a pipe, after the
-function that writes has returned: that, with the very numbers, must be found afterwards. The next
-cycle goes on in the same folder; a complete one is started anew.
+A fork is killed after a random time or, every other cycle, within milliseconds of a write. What it
+said through a pipe that it had finished must be found, and the next cycle goes on in its folder.
 """
 
 import contextlib

@@ -1,5 +1,4 @@
-"""What a person sees while they wait, and that a log sees nothing; every command in a terminal, to its
-end, as a person runs it."""
+"""What a person sees while they wait, and a log does not; every command in a terminal, to its end."""
 
 import io
 import re
@@ -17,6 +16,39 @@ from tests.shared.terminal import run_in_terminal, screen
 
 WIPED = "\x1b[1A\x1b[2K"
 """Up to the line, and the line erased."""
+QUICK = """
+from colloc import *
+PROBLEM = Problem("quick", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, delta_start=1e-2)
+"""
+STUDY = """
+from colloc import *
+STUDY = Study(
+    "few",
+    (Axis("mu_t", (1.0,)),),
+    lambda mu_t: Problem("few", friction=Friction(mu_t=mu_t), gait=Harmonic(1), delta=1e-2, delta_start=1e-2),
+    cold_starts=1,
+)
+"""
+ALSO = ["multistart quick.starts.h5 --start 0", "verify quick.h5 --compare quick.h5"]
+COMMANDS = {
+    "init": "new.py --links 3",
+    "solve": "quick.py --starts 3 --output again.h5",
+    "multistart": "quick.py --starts 1",
+    "sweep": "study.py",
+    "pareto": "quick.py --points 2 --starts 1",
+    "steer": "quick.py --turn 0 5 --starts 1",
+    "evaluate": "quick.py quick.csv",
+    "identify": "quick.py path.csv",
+    "verify": "quick.h5",
+    "report": "quick.h5",
+    "animate": "quick.h5 --periods 1 --seconds 0.2 --width 200",
+    "export": "quick.h5 --period 4 --output other.csv",
+    "robot": "quick.h5 --length 1 --mass 1 --period 4 --figure",
+    "sensitivity": "quick.h5",
+}
+LONG = ("sweep", "multistart", "pareto", "steer", "identify", "robot", "sensitivity", "report")
+CLOCK = re.compile(r"   \d+ s(, about \d+ s left)?$")
+"""How a line of progress ends."""
 
 
 class Terminal(io.StringIO):
@@ -95,41 +127,6 @@ def test_nothing_is_written_where_nobody_watches():
             line.clear()
     assert log.getvalue() == ""
     assert muted.getvalue() == ""
-
-
-QUICK = """
-from colloc import *
-PROBLEM = Problem("quick", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, delta_start=1e-2)
-"""
-STUDY = """
-from colloc import *
-STUDY = Study(
-    "few",
-    (Axis("mu_t", (1.0,)),),
-    lambda mu_t: Problem("few", friction=Friction(mu_t=mu_t), gait=Harmonic(1), delta=1e-2, delta_start=1e-2),
-    cold_starts=1,
-)
-"""
-ALSO = ["multistart quick.starts.h5 --start 0", "verify quick.h5 --compare quick.h5"]
-COMMANDS = {
-    "init": "new.py --links 3",
-    "solve": "quick.py --starts 3 --output again.h5",
-    "multistart": "quick.py --starts 1",
-    "sweep": "study.py",
-    "pareto": "quick.py --points 2 --starts 1",
-    "steer": "quick.py --turn 0 5 --starts 1",
-    "evaluate": "quick.py quick.csv",
-    "identify": "quick.py path.csv",
-    "verify": "quick.h5",
-    "report": "quick.h5",
-    "animate": "quick.h5 --periods 1 --seconds 0.2 --width 200",
-    "export": "quick.h5 --period 4 --output other.csv",
-    "robot": "quick.h5 --length 1 --mass 1 --period 4 --figure",
-    "sensitivity": "quick.h5",
-}
-LONG = ("sweep", "multistart", "pareto", "steer", "identify", "robot", "sensitivity", "report")
-CLOCK = re.compile(r"   \d+ s(, about \d+ s left)?$")
-"""How a line of progress ends."""
 
 
 @pytest.fixture(scope="session")

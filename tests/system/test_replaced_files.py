@@ -23,14 +23,6 @@ from colloc.system.files import alone_in, lock_file, replaced_file
 from colloc.system.row_file import CACHE, put_rows, read_rows
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX limits and processes")
-STUDY = """
-from colloc import *
-from colloc.studies.study import Axis, Study
-def problem(mu_t):
-    return Problem("tiny", ellipse(0, 2.85, 1.3), gait=Harmonic(1, "bilateral"), friction=Friction(mu_t=mu_t, mu_f=1, mu_b=1),
-                   delta=1e-2, delta_start=1e-2, intervals=12, mesh_tolerance=0.0)
-STUDY = Study("tiny", (Axis("mu_t", (1.0, 1.1, 1.2)),), problem, cold_starts=0)
-"""
 
 
 @contextlib.contextmanager
@@ -78,8 +70,7 @@ def in_child(function, *arguments):
 
 
 def in_child_that_cannot_write(folder, root, function):
-    """The same of one who may not write into the folder, but pass through pytest's own: those up
-    to, and without, the system's temporary folder."""
+    """The same of one who may not write into the folder, but pass through those above it."""
     temporary = Path(tempfile.gettempdir())
     top = temporary if root.is_relative_to(temporary) else root.parent
     inside = [p for p in folder.parents if p.is_relative_to(top) and p != top]
@@ -105,7 +96,6 @@ def test_a_folder_that_cannot_be_written_is_refused_at_once(samples, tmp_path, t
     temporary = Path(tempfile.gettempdir()).stat().st_mode
     folder = tmp_path / "locked away"
     folder.mkdir(mode=0o755)
-    (tmp_path / "s.py").write_text(STUDY)
 
     def attempt():
         refused = 0

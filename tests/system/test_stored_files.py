@@ -19,6 +19,8 @@ KIND = "colloc test 1"
 CHARACTERS = st.characters(exclude_categories=["Cs"])
 FIXTURES = [HealthCheck.function_scoped_fixture]
 NUMBERS = True, 3, -2.5, [1.0, np.nan], [[1, 2]], [True, False], np.zeros((0, 2)), np.float32(0.5)
+TEXTS = ["", "1", "ä", "Reibung \N{GREEK SMALL LETTER MU}_t / µ_f", "tab\tand\nline", "nul\0inside"]
+TEXTS += ["\N{SNAKE}" * 500]
 
 
 def test_rows_come_back_as_they_were_in_the_order_in_which_their_keys_came(tmp_path):
@@ -98,10 +100,6 @@ def test_a_value_is_computed_once(tmp_path):
     assert cached(path, "key", lambda: (1, 2)) == [1, 2]
     assert cached(path, "key", lambda: pytest.fail("not taken from the file")) == [1, 2]
     assert read_rows(path, CACHE) == {"key": [1, 2]}
-
-
-TEXTS = ["", "1", "ä", "Reibung \N{GREEK SMALL LETTER MU}_t / µ_f", "tab\tand\nline", "nul\0inside"]
-TEXTS += ["\N{SNAKE}" * 500]
 
 
 def returned(path, value):

@@ -19,6 +19,7 @@ UNGUARDED = {
     "colloc's": "import colloc\nfrom operator import neg as task",
     "its own": "def task(x):\n    return -x",
 }
+PROGRAM = "from colloc.system.environment import one_thread_each; one_thread_each(); import os; print(os.environ['OPENBLAS_NUM_THREADS'])"
 
 
 def listed(tasks):
@@ -171,14 +172,6 @@ def test_ctrl_c_while_a_task_is_handed_over_leaves_the_executors_locks_open():
     with pytest.raises(KeyboardInterrupt):
         list(run_tasks(doubled, listed([Task(1, (1,))]), workers=1, executor=Locked))
     assert not Locked.lock.locked()
-
-
-PROGRAM = """
-import os
-from colloc.system.environment import one_thread_each
-one_thread_each()
-print(os.environ["OPENBLAS_NUM_THREADS"])
-"""
 
 
 def said(environment):

@@ -1,5 +1,4 @@
-"""Motion at delta = 0, between bounds: against cone programs and against small delta; each part of the
-interval of a period widens it by as much as that part is off."""
+"""Motion at delta = 0 between bounds, against cone programs; each part widens them by its own."""
 
 from dataclasses import replace
 
@@ -19,6 +18,9 @@ UNEVEN = Chain(
     (0.3, 0.2, 0.5),
     feet=(Foot(0, 0.4, weight=0.2), Foot(1, 0.5, weight=0.3), Foot(2, 0.1), Foot(2, 0.9)),
 )
+BODY, LAW, GAIT = Chain(), Friction(), ellipse(A0=0, A1=2.0, B1=1.0)
+DELTA = 1e-6 * float(np.abs(GAIT(np.linspace(0.0, 1.0, 101))[1]).max(axis=0).mean())
+OFF = 1e-3
 
 
 def instants(body, seed, count=20):
@@ -27,8 +29,7 @@ def instants(body, seed, count=20):
 
 
 def least_power(body, mu_t, angles, rates):
-    """Of a body on feet at one instant, by Clarabel: the least sum of weights times
-    |(v along, mu_t v across)| over velocities of the tail."""
+    """Least sum of weights times |(v along, mu_t v across)| of a body on feet, by Clarabel."""
     turn = np.exp(1j * np.cumsum([0.0, *angles]))
     spin, links = np.cumsum([0.0, *rates]), np.array(body.lengths) * turn
     hinges, moving = (np.cumsum([0.0, *each])[:-1] for each in (links, 1j * spin * links))
@@ -147,11 +148,6 @@ def test_of_three_feet_in_a_row_any_two_may_rest_the_bounds_hold_all(lengths, pl
     assert found.apart[0, 0] < 1e-5
     assert across <= found.apart[1, 0]
     assert spin <= found.apart[2, 0] < 1.5 * np.ptp(rest[:, 1])
-
-
-BODY, LAW, GAIT = Chain(), Friction(), ellipse(A0=0, A1=2.0, B1=1.0)
-DELTA = 1e-6 * float(np.abs(GAIT(np.linspace(0.0, 1.0, 101))[1]).max(axis=0).mean())
-OFF = 1e-3
 
 
 @pytest.fixture

@@ -28,6 +28,10 @@ LEANING = Fourier(mean=[0.3, -0.5], cos=[[0.4], [0.9]], sin=[[1.1], [-0.2]])
 
 
 ONCE = [("motion", 2, 6), ("slope", 1, 45), ("motion", 1, 17), ("motion", 2, 18), ("slope", 1, 57)]
+ELLIPSE = [[0.0, 0.0], [[2.0], [-2.0]], [[1.0], [1.0]]]
+TRUE = Played(0.05, 0.1, 2.0, 0.0, 100, 1e-9)
+ROW = {"number": 0, "gait": ELLIPSE, "claimed": 0.05, "ambiguity": 0.0}
+ROW |= {"efficiency": [0.05, 1e-7], "distance": [0.1, 1e-7], "work": [2.0, 1e-7]}
 
 
 def test_the_other_program_has_the_forces_of_the_integral_table_in_sixty_digits():
@@ -93,12 +97,6 @@ def test_meshes_are_held_against_a_motion_whose_error_is_known_where_friction_ha
     *_, x, y, work = np.diff(rough.at(np.array([0.0, 1.0])))[:, 0]
     found = mesh_error(control, mesh, LEANING, 1e-3, fine=rough)
     assert found.unresolved == pytest.approx(rough.error * (1 / np.hypot(x, y) + 1 / work))
-
-
-ELLIPSE = [[0.0, 0.0], [[2.0], [-2.0]], [[1.0], [1.0]]]
-TRUE = Played(0.05, 0.1, 2.0, 0.0, 100, 1e-9)
-ROW = {"number": 0, "gait": ELLIPSE, "claimed": 0.05, "ambiguity": 0.0}
-ROW |= {"efficiency": [0.05, 1e-7], "distance": [0.1, 1e-7], "work": [2.0, 1e-7]}
 
 
 @pytest.mark.slow

@@ -133,8 +133,7 @@ def test_kinks_are_instants_at_which_a_point_of_a_link_is_at_rest(friction):
     fine = fine_of(stated, Mesh(scheme("gauss-3"), np.linspace(0.0, 0.5, 21)))
     kinks = kink_phases(stated.body, friction, GAIT, DELTA, fine)
     assert 4 <= kinks.size <= 24
-    # reversing the motion of the body about the middle of the half period maps kinks to kinks (A0 =
-    # 0)
+    # reversing the motion about the middle of the half period maps kinks to kinks (A0 = 0)
     np.testing.assert_allclose(np.sort(0.5 - kinks), kinks, atol=2e-4)
     angles, rates = GAIT(kinks)
     z = colloc.solve_balance(stated.body, friction, angles, rates, DELTA).z

@@ -1,5 +1,4 @@
-"""The replay against motions whose distance and work are known exactly, and what halving panels says
-of the error: at kinks anywhere, corners, in the distance."""
+"""The replay against motions that are known exactly; what halving panels says of the error."""
 
 import json
 from dataclasses import replace

@@ -9,6 +9,7 @@ from scipy.optimize import root
 import colloc
 from colloc import Chain, Foot, Fourier, Friction, Wheel, replay, slope_motion
 from colloc.gaits.regime import Regime
+from colloc.verification import differential_motion as motion
 from tests.shared.mechanics import coulomb, wrench
 
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
@@ -103,9 +104,7 @@ def test_skates_hold_across_the_slope_and_not_along():
     "mu", [(1, 1, 1), pytest.param((2, 1, 3), marks=pytest.mark.slow)], ids=str
 )
 def test_a_gait_that_is_its_own_reverse_keeps_every_heading(mu):
-    """Backwards in time, and read from the other end, it is the same gait; the slope is turned over
-    with the friction. So the map of headings is its own inverse, and a monotone one that is must be
-    none."""
+    """With the slope turned over: a monotone map of headings that is its own inverse is none."""
     at = Chain(), coulomb(*mu), colloc.ellipse(A0=0.4, A1=1.5, B1=1.0), 1e-2
 
     def ran(heading, grade=0.3):
@@ -128,6 +127,25 @@ def test_the_steering_is_the_slope_of_the_map():
     slope = (ends[2].headings[1] - ends[0].headings[1]) / 2e-3
     assert ends[1].steering[0] == pytest.approx(slope, abs=1e-4)
     assert abs(slope - 1.0) > 1e-2
+
+
+def test_joints_work_by_their_moments_and_what_balances_leave_over_is_told(monkeypatch):
+    balance, solve = motion.balance_on_slope, motion.solve_balance
+
+    def harder(*at, **how):
+        solved, now, *more = balance(*at, **how)
+        return solved, now._replace(actuator_power=1.01 * now.actuator_power), *more
+
+    def roughly(*at, **how):
+        solved = solve(*at, **how)
+        return replace(solved, residual=solved.residual + 1e-3 * np.arange(solved.residual.size))
+
+    monkeypatch.setattr(motion, "balance_on_slope", harder)
+    monkeypatch.setattr(motion, "solve_balance", roughly)
+    gait, how = replace(SKEW, theta=0.3), {"regime": Regime(grade=0.1), "tolerance": 1e-2}
+    played = replay(Chain(), Friction(), gait, 0.1, **how)
+    assert played.actuator_work / played.work == pytest.approx(1.01, abs=1e-3)
+    assert played.residual == pytest.approx(1e-3 * (played.instants - 1), rel=1e-3)
 
 
 @pytest.mark.parametrize("rough", [1.0, 100.0])  # works of 100 are off by most
