@@ -467,7 +467,7 @@ speed_limit=(5.0, 8.0, 5.0) -> has 3 values
 speed_limit=-1.0 -> positive and finite
 limits=[PathLimit("heat", "moment**2", (1.0, 1.0, 1.0))] -> has 3 values; give one, or 2
 limits=[PathLimit("speed", "rate", 9.0)], gait=Polygon(4) -> the speed is limited
-limits=[PathLimit("speed", "speed", 9.0)] -> one of a free pace
+limits=[PathLimit("speed", "speed", 9.0)] | objective=Objective("1 / x", quantities=[Quantity("x", "sum(speed**2)")]) -> one of a free pace
 limits=["moment < 1"] | limits=3 -> PathLimit
 limits=[PathLimit("heat", "moment**2", -1.0)] | limits=[PathLimit("heat", "moment**2", "x")] -> must be positive
 objective="driven efficiency", formulation="implicit velocity" -> formulation 'full'
@@ -491,7 +491,7 @@ froude=(-1.0, 0.1) -> above 0
 froude=(0.1, np.inf) | froude=(0.1, 1.0, 2.0) -> two numbers
 froude=(0.1, 1.0), objective="1 / length" -> depends on it
 froude=(0.1, 1.0), objective="distance / period", gait=Polygon(4) -> of a class Harmonic
-objective="distance / period" -> state the pace
+objective="distance / period" | at_least={"distance / period": 0.1} -> state the pace
 grade=-1.0 | grade="steep" -> grade must be
 grade=0.1, gait=Polygon(symmetry="bilateral") -> no part of a cycle follows from another: take Polygon
 grade=0.1, body=CrawlerBody() -> only a Chain
@@ -527,7 +527,7 @@ gait=Serpenoid(), body=Chain((0.5, 0.5)) -> at least three links
 gait=Coupled(Harmonic(1, "bilateral"), gears=UNEVEN), body=FIVE -> symmetry none or antipodal
 gait=Coupled(MIRRORED, stuck={1: 0.4}), body=FIVE | gait=Coupled(Harmonic(1, "antipodal"), stuck={1: 0.4}), body=FIVE -> may have the symmetry none
 gait=Harmonic(1), joint_limit=0.05 -> with joint_limit the usual first gait
-objective="turning" -> rotation
+objective="turning" | at_least={"rotation": 0.1} -> rotation
 rotation=0.2, gait=MIRRORED -> bilateral gait turns
 rotation=np.inf -> rotation must be
 at_least={"distance": "far"} -> finite number
@@ -560,6 +560,7 @@ gait=Polygon(2), friction=Friction(mu_t=1, mu_f=1, mu_b=2)
 gait=Basis([BUMP]), friction=Friction(mu_t=1, mu_f=1, mu_b=2)
 froude=0.1, body=Chain((0.4, 0.6)), gait=Harmonic(3, "antipodal"), friction=Friction(mu_t=2.0)
 froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(2)
+froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(1, "antipodal"), grade=0.1
 delta_start=0.0
 gait=Coupled(Harmonic(1, "antipodal"), gears=UNEVEN), body=FIVE
 """

@@ -517,7 +517,8 @@ class Problem:
         if self.robot is None:
             return self
         values = {name: getattr(self, name) for name in ("objective", *DERIVED)}
-        return self.with_(robot=None, **values)
+        limits = *self.robot.speed_limits(self.grade, self.n_motor), *self.limits
+        return self.with_(robot=None, limits=limits, **values)
 
     def to_dict(self) -> dict:
         """All fields as plain numbers, strings and lists (JSON); those `STATED_IF_SET` only if they

@@ -140,6 +140,8 @@ def test_statements_read_back_as_what_they_were():
     for gait_class in CLASSES:
         gait = member(gait_class)
         assert part_from(KINDS, fields(gait_class)) == gait_class
+        again = type(type(gait_class).__name__, (type(gait_class),), {})  # of two the last defined
+        assert type(part_from([*KINDS, again], fields(gait_class))) is again
         read = gait_from(fields(gait))
         assert read.basis == gait.basis
         np.testing.assert_array_equal(read.table, gait.table)

@@ -38,6 +38,7 @@ def test_on_a_slope_that_part_of_gravity_counts_which_presses(unsolved):
     (speed,), (uphill,) = level.path_limits.each, slope.path_limits.each
     assert speed.most == pytest.approx((5 * (0.62 / 9.81) ** 0.5,) * 2)
     assert uphill.most == pytest.approx(np.multiply(speed.most, 1.25**0.5))
+    assert slope.without_robot.path_limits == slope.path_limits
     gait = colloc.Fourier([0.0, 0.0], [[1.2], [0.0]], [[0.0], [0.8]], theta=0.3, log_period=2.0)
     found = unsolved(slope.with_(guess=gait, gait=Harmonic(1), delta=1e-2))
     period = np.exp(2.0) * (0.62 / (0.8 * 9.81)) ** 0.5

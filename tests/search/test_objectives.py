@@ -217,15 +217,16 @@ def test_what_must_be_reached_is_stated_in_units_of_friction_too():
     assert control_problem(mixed).unit == 1.0
 
 
-def test_a_pace_counts_by_its_ratio_to_friction():
-    """It drives momenta: with a tenth of it and of the Froude number a gait moves as before."""
+@pytest.mark.parametrize("grade", [0.0, 0.1])
+def test_a_pace_and_a_slope_count_by_their_ratio_to_friction(grade):
+    """With a tenth of it, of the grade and of the Froude number a gait moves as before."""
     periods, asked = [], {"gait": Harmonic(1), "objective": "driven efficiency"}
     for size in (1.0, 0.1):
-        problem = stated(size, size, size, froude=0.05 * size, **asked)
+        problem = stated(size, size, size, froude=0.05 * size, grade=grade * size, **asked)
         space, v = space_near(problem, ellipse(0.3, 1.0, 0.5))
         periods.append(ReducedProgram(space, 1e-2).period(v))
     unit, light = periods
-    assert unit["distance"] > 1e-3
+    assert abs(unit["distance"]) > 1e-4
     assert light["distance"] == pytest.approx(unit["distance"], rel=1e-9)
     for name in ("work", "driven_work"):
         assert light[name] == pytest.approx(0.1 * unit[name], rel=1e-9)
