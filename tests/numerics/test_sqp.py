@@ -155,14 +155,13 @@ def test_steps_in_several_threads_are_those_of_one():
         np.testing.assert_array_equal(found, steps(seed))
 
 
-def step_of_one(low, high):
-    """The step of one number, at most 10, that is smallest and has two rows of itself."""
-    box = -np.full(1, 10.0), np.full(1, 10.0)
-    return quadratic_step(np.eye(1), np.zeros(1), np.ones((2, 1)), *np.array([low, high]), *box)
-
-
 def test_a_step_meets_rows_that_agree_and_of_rows_that_contradict_each_other_a_part_is_removed():
     """Of d <= -1 and d >= 3 none, for what helps one harms the other."""
+
+    def step_of_one(low, high):
+        box = -np.full(1, 10.0), np.full(1, 10.0)
+        return quadratic_step(np.eye(1), np.zeros(1), np.ones((2, 1)), *np.array([low, high]), *box)
+
     step = step_of_one([-np.inf, 3.0], [-1.0, np.inf])
     assert step.share == pytest.approx(0, abs=1e-9)
     assert step.d == pytest.approx([0.0], abs=1e-8)

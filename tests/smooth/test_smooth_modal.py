@@ -151,7 +151,7 @@ def found(panels, delta=1e-2, **changes):
     return evaluate_at(*space_near(stated, GAIT), delta)
 
 
-def test_panels_are_added_where_a_point_at_rest_moves_over_them():
+def test_panels_are_added_where_a_point_at_rest_moves_over_them_alone():
     coarse = found(8)
     finer, v = on_more_panels(coarse)
     exact = -found(96).objective
@@ -159,9 +159,7 @@ def test_panels_are_added_where_a_point_at_rest_moves_over_them():
     after = -ReducedProgram(finer, 1e-2).objective(v)
     assert abs(after - exact) < 0.2 * abs(-coarse.objective - exact)
     np.testing.assert_array_equal(finer.mesh.edges, coarse.space.mesh.edges)
-
-
-def test_panels_stay_where_they_do_not_matter():
+    # and stay where they do not matter
     assert on_more_panels(found(16, delta=0.5)) is None
     sideways = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
     assert on_more_panels(found(8, friction=sideways, mesh_tolerance=1e-2)) is None

@@ -34,15 +34,6 @@ from tests.shared.cases import slow
 ALONG = Friction(mu_t=100.0, mu_f=1.0, mu_b=1.0)
 
 
-def test_wave_B_to_eight_digits():
-    """Two unrelated discretisations agree to 8 digits, and with the design notes' 0.737066."""
-    p = measured_period(Wave().prescribed(), ALONG, 1e-4, intervals=8)
-    q = period(Wave().prescribed(), ALONG, 1e-4, intervals=3, nodes=7, panels=11, order=11)
-    assert p.efficiency == pytest.approx(q.efficiency, abs=2e-9)
-    assert p.errors["efficiency"] < 1e-9
-    assert p.efficiency == pytest.approx(0.737066, abs=1e-6)
-
-
 def chain_period(friction, n_link, delta=1e-4, instants=16):
     """Distance and work of a chain whose links have wave B's tangent angles at their midpoints, by
     equal steps in time over half a period, spectrally accurate for travelling waves."""
@@ -62,8 +53,14 @@ def chain_period(friction, n_link, delta=1e-4, instants=16):
     return abs(along.real), moved.power.mean()
 
 
-def test_wave_B_by_a_chain_of_links_extrapolated():
-    """Links have closed-form friction, no panels; their quadratic error is extrapolated away."""
+def test_wave_B_to_eight_digits_and_by_a_chain_of_links_extrapolated():
+    """Two unrelated discretisations agree to 8 digits, and with the design notes' 0.737066. Links have
+    closed-form friction, no panels; their quadratic error is extrapolated away."""
+    p = measured_period(Wave().prescribed(), ALONG, 1e-4, intervals=8)
+    q = period(Wave().prescribed(), ALONG, 1e-4, intervals=3, nodes=7, panels=11, order=11)
+    assert p.efficiency == pytest.approx(q.efficiency, abs=2e-9)
+    assert p.errors["efficiency"] < 1e-9
+    assert p.efficiency == pytest.approx(0.737066, abs=1e-6)
     coarse, fine = (np.array(chain_period(ALONG, n)) for n in (160, 320))
     d, W = (4 * fine - coarse) / 3
     smooth = period(Wave().prescribed(), ALONG, 1e-4, intervals=2)
