@@ -168,16 +168,26 @@ def farthest(problem: Problem) -> list[Iterate]:
 def with_reachable_distance(problem: Problem) -> tuple[Problem, list[AnyGait]]:
     """The problem with its `least_distance` among `at_least`: all of it, or half of what the
     farthest gait goes, if that is less; and the gaits that go farthest, for a search to begin from,
-    as few others may go as far. They are known first, so that no search is for a distance that no
-    gait reaches."""
+    as few others may go as far. They are known first, unless the guess goes twice as far, so that
+    no search is for a distance that no gait reaches."""
     stated = {aim.name for aim, _ in problem.at_least}
     if problem.least_distance is None or "distance" in stated or not problem.gait.free:
         return problem, []
-    optima, least = farthest(problem), problem.least_distance
-    least = least if optima[0].value >= least else 0.5 * optima[0].value
-    active_run().begin_again()
+    optima, least = list[Iterate](), problem.least_distance
+    if not _guess_goes(problem, 2 * least):
+        optima = farthest(problem)
+        least = least if optima[0].value >= least else 0.5 * optima[0].value
+        active_run().begin_again()
     reachable = problem.with_(at_least=(*problem.at_least, ("distance", least)))
     return reachable, [each.gait for each in optima]
+
+
+def _guess_goes(problem: Problem, distance: float) -> bool:
+    """True if the guess keeps all limits and goes so far: then many gaits do."""
+    with suppress(CollocError):
+        here = evaluate_at(*space_near(problem, problem.guess), problem.delta)
+        return here.violation <= COARSE and here.step.distance >= distance
+    return False
 
 
 def follow_rest(problem: Problem, explored: Exploration) -> list[Iterate]:

@@ -292,11 +292,18 @@ def test_the_error_of_a_value_is_relative_to_its_magnitude_whatever_its_sign(exp
     assert Objective(expression).relative_error(period, {"work": 0.1}) == pytest.approx(0.05)
 
 
-@pytest.mark.parametrize(("asked", "least"), [(0.3, 0.1), (0.15, 0.15)])
-def test_of_a_distance_that_no_gait_goes_half_of_the_farthest_is_asked(asked, least, monkeypatch):
+@pytest.mark.parametrize(
+    ("asked", "least", "begun"),
+    [(0.3, 0.1, ["far", "other"]), (0.15, 0.15, ["far", "other"]), (0.1, 0.1, [])],
+)
+def test_of_a_distance_that_no_gait_goes_half_of_the_farthest_is_asked(
+    asked, least, begun, monkeypatch
+):
+    """None is looked for where the guess, which goes 0.268, goes twice as far."""
     farthest = [SimpleNamespace(value=0.2, gait="far"), SimpleNamespace(value=0.1, gait="other")]
     monkeypatch.setattr("colloc.search.explore.farthest", lambda problem: farthest)
-    problem, known = with_reachable_distance(Problem("far", least_distance=asked))
-    assert known == ["far", "other"]
+    stated = Problem("far", guess=ellipse(0, 2.86, 1.3), least_distance=asked)
+    problem, known = with_reachable_distance(stated)
+    assert known == begun
     stated = problem.at_least
     assert [(aim.name, level) for aim, level in stated] == [("distance", least)]
