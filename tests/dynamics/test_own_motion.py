@@ -1,9 +1,5 @@
-"""A kind of motion that the library does not know, in this file alone: solved, certified, kept and
-read like any other.
-
-A body is pushed along its tail link by a constant force, as by a propeller; it crawls slowly, on
-the level.
-"""
+"""A kind of motion that the library does not know, in this file alone: solved, certified, kept and read like
+any other. A body that crawls slowly on the level is pushed along its tail link, as by a propeller."""
 
 from dataclasses import dataclass
 

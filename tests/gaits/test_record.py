@@ -83,21 +83,6 @@ READ = {
     "angles without a sign": ("t,q1_deg,q2_deg,q3_deg\n" + table(SECONDS, D % 360, E % 360, F % 360), "whole turns taken out"),
     "times called otherwise": ("Uhr,Gelenk1,Gelenk2,Gelenk3\n" + table(SECONDS, A, B, C), "time from Uhr"),
 }
-# fmt: on
-
-
-@pytest.mark.parametrize("kind", READ)
-def test_a_record_is_read_right_and_what_was_taken_is_said(kind, tmp_path):
-    content, said = READ[kind]
-    found = read(tmp_path, content)
-    start = 1 / 60 if kind == "blank cells" else 0.0  # its first sample is blank
-    np.testing.assert_allclose(found.gait.angles(T - start), ANGLES, atol=1e-5)
-    assert found.describe().startswith("read 3 joints ")
-    with pytest.raises(AssertionError, match=said):
-        raise AssertionError(found.describe())
-
-
-# fmt: off
 REFUSED = {
     "ticks": ("t,m1,m2,m3\n" + table(SECONDS, *np.round(512 + DEGREES * 1023 / 300)), "m1 goes up to .* like ticks .* of a servo"),
     "pulses": ("millis,s1,s2,s3\n" + table(1000 * SECONDS, *np.round(1500 + DEGREES / 0.09)), r"\(microseconds - 1500\)"),
@@ -134,6 +119,17 @@ REFUSED = {
     "a workbook": (b"PK\x03\x04\x14\x00\x06", "save as CSV"),
 }
 # fmt: on
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_a_record_is_read_right_and_what_was_taken_is_said(kind, tmp_path):
+    content, said = READ[kind]
+    found = read(tmp_path, content)
+    start = 1 / 60 if kind == "blank cells" else 0.0  # its first sample is blank
+    np.testing.assert_allclose(found.gait.angles(T - start), ANGLES, atol=1e-5)
+    assert found.describe().startswith("read 3 joints ")
+    with pytest.raises(AssertionError, match=said):
+        raise AssertionError(found.describe())
 
 
 @pytest.mark.parametrize("kind", REFUSED)

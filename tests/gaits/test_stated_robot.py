@@ -9,6 +9,7 @@ from PIL import Image
 
 import colloc
 from colloc import Chain, Free, Harmonic, Problem, Robot
+from colloc.gaits.parameters import parameters
 from colloc.mechanics.densities import Instants
 from colloc.results.comparison import compare
 from colloc.results.robot import in_si, limit_lines
@@ -59,6 +60,8 @@ def test_what_follows_from_the_robot_is_neither_stated_nor_saved_beside_it():
     assert not {"froude", "speed_limit", "torque_limit"} & problem.to_dict().keys()
     faster = problem.with_(robot=replace(SNAKE, period=1.25))
     assert faster.froude == pytest.approx(4 * problem.froude)
+    numbers = {each.name: each for each in parameters(problem)}
+    assert numbers["Froude number"].changed(0.1).froude == pytest.approx(1.1 * problem.froude)
     battery = problem.with_(objective=None, robot=replace(SNAKE, idle_power=0.0))
     assert battery.objective.name == "driven efficiency"
 

@@ -225,6 +225,9 @@ def test_formulas_of_a_law_of_ones_own_are_no_numbers(stated):
     assert not any("friction" in name or "drag" in name for name in names)
 
 
+BILATERAL, STEEP = colloc.Harmonic(1, "bilateral"), colloc.Friction(mu_t=1, mu_f=1, mu_b=2)
+
+
 @pytest.mark.parametrize(
     "changes",
     [
@@ -232,10 +235,12 @@ def test_formulas_of_a_law_of_ones_own_are_no_numbers(stated):
         {"joint_limit": ((-1, 2), 1.5), "speed_limit": 12.0},
         {"at_least": {"distance": 0.1}, "torque_limit": (0.1, 0.2)},
         {"body": colloc.Chain(weights=(0.3, 0.3, 0.4), width=0.02), "grade": 0.1},
-        {"body": colloc.Chain(feet=MIRRORED), "gait": colloc.Harmonic(1, "bilateral")},
+        {"body": colloc.Chain(feet=MIRRORED), "gait": BILATERAL},
         {"friction": colloc.PowerLaw(0.3), "gait": colloc.Harmonic(2)},
         {"friction": colloc.Axle(rolling=0.03, sideways=0.7)},
         {"gait": colloc.Polygon(3)},
+        {"body": colloc.ModalBody(2), "gait": colloc.Harmonic(1), "at_least": {"distance": 0.0}},
+        {"body": colloc.Chain((0.5, 0.5), feet=1), "friction": STEEP, "gait": BILATERAL},
     ],
 )
 def test_every_number_can_change_and_nothing_else_does(changes):

@@ -179,7 +179,7 @@ def test_where_the_period_is_sought_a_front_is_of_the_speed_unless_another_objec
 
 
 def test_of_a_quantity_that_is_asked_for_twice_the_larger_value_counts():
-    twice = PROBLEM.with_(at_least=[("distance", 0.1), ("distance", 0.2), ("work", 0.1)])
+    twice = PROBLEM.with_(at_least=[("distance", x) for x in (0.1, 0.2, 0.15)] + [("work", 0.1)])
     assert [least for _, least in twice.at_least] == [0.2, 0.1]
 
 

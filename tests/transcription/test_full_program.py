@@ -359,8 +359,8 @@ def test_bounds_that_were_moved_stay_where_a_program_is_placed_anew():
         full = full.with_bounds(name, full.row_lower[rows] - by, full.row_upper[rows] + by)
     again, there = full.moved_to(x)
     np.testing.assert_allclose(there, x, atol=1e-12)
-    for bounds in ("row_lower", "row_upper"):
-        np.testing.assert_array_equal(getattr(again, bounds), getattr(full, bounds))
+    bounds = [[each.row_lower, each.row_upper] for each in (again, full)]
+    np.testing.assert_array_equal(*bounds)
 
 
 def test_one_variable_in_two_places_of_a_function_has_both_mixed_derivatives():
