@@ -38,8 +38,7 @@ STARTS = 1
 posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and permissions")
 needs_full = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such device")
 needs_bash = pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
-OK = (0, 4)
-"""Solved; certified or not, at so large a delta."""
+OK = (0, 4)  # solved; certified or not, at so large a delta
 LETTERS = "# Länge der Schlange: µ_t = 1" + QUICK
 WIDE = """
 from colloc import *

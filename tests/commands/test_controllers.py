@@ -72,8 +72,7 @@ def test_pulses_are_those_of_the_angles_and_what_is_clamped_is_said(options, sen
 
 
 def test_degrees_are_read_again_as_the_same_gait(sent, three_link, tmp_path):
-    degrees = sent("--degrees", "x.csv")
-    read = colloc.evaluate(three_link.problem, degrees)
+    read = colloc.evaluate(three_link.problem, sent("--degrees", "x.csv"))
     assert read.efficiency == pytest.approx(three_link.efficiency, rel=1e-4)
 
 

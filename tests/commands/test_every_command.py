@@ -180,6 +180,7 @@ def test_a_good_problem_is_solved_saved_and_drawn(tmp_path, capsys):
     assert "efficiency d/W" in printed
     assert "a paper" in printed
     assert "dry friction    between 0." in printed
+    assert colloc(["verify", f"{tmp_path}/out/quick.h5"]) == 0
     assert "delta had to be lowered from 0.3" in printed
 
 

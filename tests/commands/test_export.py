@@ -165,8 +165,7 @@ def test_the_command_writes_csv_and_json_that_say_what_they_are(three_link, tmp_
     assert replayed.efficiency == pytest.approx(json.loads(facts["efficiency"]), rel=2e-4)
     way = json.loads(facts["distance_per_period_body_lengths"])
     assert replayed.distance == pytest.approx(way, rel=2e-4)
-    words = f"--period 4 --no-ramp --output {tmp_path}/y.json"
-    assert main([str(file), *words.split()]) == 0
+    assert main([str(file), *f"--period 4 --no-ramp --output {tmp_path}/y.json".split()]) == 0
     data = json.loads((tmp_path / "y.json").read_text())
     assert np.shape(data["angles_rad"]) == (2, 200)
     assert data["status"] == "solved"

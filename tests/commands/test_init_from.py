@@ -168,8 +168,7 @@ def test_a_model_that_colloc_writes_is_read_as_the_same_body(kind, body, tmp_pat
     n = body.n_joint
     gait = colloc.Fourier(np.zeros(n), 0.6 * np.eye(n)[:, :1], 0.6 * np.eye(n)[:, 1:2])
     solution = colloc.evaluate(problem.with_(gait=Harmonic(1, "none")), gait)
-    path = tmp_path / f"robot.{kind}"
-    solution.export(path, period=4.0, length=0.8, mass=1.5)
+    solution.export(tmp_path / f"robot.{kind}", period=4.0, length=0.8, mass=1.5)
     back = read(tmp_path, None, "--period", "4", "--mu", "0.5", kind=kind)
     assert back.body.lengths == pytest.approx(body.lengths, rel=1e-8)
     assert back.body.mass_column() == pytest.approx(body.mass_column(), rel=1e-8)
@@ -291,8 +290,7 @@ BODY = "<mujoco><worldbody><body><body name='x'>{}</body></body></worldbody></mu
     ],
 )
 def test_other_files_are_named_for_what_they_are(content, word, tmp_path, capsys):
-    words = ["--links", "4"] if content is WORM else []
-    assert read(tmp_path, content, *words) == BAD_PROBLEM
+    assert read(tmp_path, content, *["--links", "4"] if content is WORM else []) == BAD_PROBLEM
     assert word in capsys.readouterr().err
 
 

@@ -51,8 +51,7 @@ def test_verify_uses_other_instants_and_agrees(three_link, tmp_path, capsys):
 def test_verify_finds_a_tampered_gait(three_link, tmp_path, capsys):
     x = three_link.answer.x.copy()
     x[three_link.answer.layout.parameters[1, 0]] += 0.05
-    tampered = replace(three_link, answer=replace(three_link.answer, x=x))
-    file = save(tampered, tmp_path / "gait.h5")
+    file = save(replace(three_link, answer=replace(three_link.answer, x=x)), tmp_path / "gait.h5")
     failed = replace(three_link, answer=replace(three_link.answer, optimal=False))
     for path, said in (
         (file, "three_link: NOT VERIFIED"),
@@ -162,8 +161,7 @@ def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_pat
 
 def told_of_limits(gait=LOOP, **limits):
     """A gait and what its summary says of its limits."""
-    stated = Problem("limited", gait=colloc.Harmonic(1), delta=1e-2, **limits)
-    found = evaluate(stated, gait)
+    found = evaluate(Problem("limited", gait=colloc.Harmonic(1), delta=1e-2, **limits), gait)
     return found, [line[18:] for line in summary_lines(found, None) if line.startswith("  limits ")]
 
 

@@ -50,8 +50,7 @@ def bodies(axes):
     ),
 )
 def test_no_words_over_words_and_nothing_cut_off(n_link, size, unsolved):
-    solution = unsolved(crawler(n_link, size))
-    texts = assert_readable(solution.plot())
+    texts = assert_readable(unsolved(crawler(n_link, size)).plot())
     named = range(2, n_link) if n_link <= 9 else (4, 7, 9, 12)
     joints = {"joint angle 2  [rad]"} if n_link == 3 else {"joint 1", *map(str, named)}
     assert joints <= set(texts)
@@ -59,8 +58,7 @@ def test_no_words_over_words_and_nothing_cut_off(n_link, size, unsolved):
 
 @pytest.mark.parametrize("n_link", [6, slow(13)])
 def test_joints_of_a_robot_are_named_above_the_panels_in_colours_that_differ(n_link, unsolved):
-    solution = unsolved(crawler(n_link, 0.3))
-    figure = solution.robot(length=1.0, mass=1.0, period=4.0).plot()
+    figure = unsolved(crawler(n_link, 0.3)).robot(length=1.0, mass=1.0, period=4.0).plot()
     assert_readable(figure)
     for axes in figure.axes:
         assert axes.get_legend().get_window_extent().y0 >= axes.bbox.y1

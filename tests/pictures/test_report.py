@@ -28,8 +28,7 @@ BROWSER = next(
     (path for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if path),
     None,
 )
-VOID = {"meta", "br", "hr", "input", "img", "link"}
-"""Elements without an end tag."""
+VOID = {"meta", "br", "hr", "input", "img", "link"}  # elements without an end tag
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&<!--"
 NO_SLIDERS = {
     "nine": (Fourier(np.zeros(8), np.full((8, 1), 0.1), np.eye(8, 1)), Chain((1 / 9,) * 9)),
@@ -142,8 +141,7 @@ def test_everything_from_the_file_is_escaped(three_link):
 
 @pytest.mark.parametrize("n_link", slow_but([2, 3], [2, 3, 5, 8]))
 def test_chains_of_two_to_eight_links(n_link, unsolved):
-    solution = unsolved(crawler(n_link))
-    page = report_page(solution)
+    page = report_page(unsolved(crawler(n_link)))
     seen = outline(page)
     motion = json.loads(seen.scripts[0])
     assert len(motion["x"]) == n_link + 1
@@ -159,8 +157,7 @@ def test_frames_keep_link_lengths_and_their_friction_balances(n_link, unsolved):
     lengths = np.hypot(*np.diff(shown.ends, axis=1))
     np.testing.assert_allclose(lengths, np.full_like(lengths, 1 / n_link), atol=1e-12)
     # friction per length adds up to the net force, which vanishes but for z between mesh points
-    total = shown.arrow.mean(axis=1)
-    assert np.median(np.hypot(*total)) < 0.02
+    assert np.median(np.hypot(*shown.arrow.mean(axis=1))) < 0.02
     velocity = np.gradient(shown.arrow_base, shown.motion.t, axis=2)
     spent = -(shown.arrow * velocity).sum(axis=0).mean(axis=0)
     assert np.trapezoid(spent, shown.motion.t) == pytest.approx(solution.measured.work, rel=5e-3)
@@ -215,8 +212,7 @@ def test_a_browser_runs_the_page_without_a_word(three_link, tmp_path):
 
 
 def test_a_notebook_shows_a_card_with_a_film_of_two_periods(three_link):
-    page = three_link._repr_html_()
-    film = re.search(r'points" values="([^"]+)"', page)[1].split(";")
+    film = re.search(r'points" values="([^"]+)"', three_link._repr_html_())[1].split(";")
     # (time, point, 2) [pixels]
     drawn = np.array([[p.split(",") for p in frame.split()] for frame in film], dtype=float)
     half, scale = len(film) // 2, 3 * np.hypot(*(drawn[0, 1] - drawn[0, 0]))
@@ -233,8 +229,7 @@ def test_a_notebook_shows_a_card_with_a_film_of_two_periods(three_link):
 
 
 def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three_link, tmp_path):
-    solution = replace(three_link, source="")
-    text = unescape(report_page(solution))
+    text = unescape(report_page(replace(three_link, source="")))
     stated = text[text.index("from colloc import Problem") :].partition("</code>")[0]
     (tmp_path / "stated.py").write_text(stated, encoding="utf-8")
     assert colloc.load_problem(tmp_path / "stated.py").hash == three_link.problem.hash

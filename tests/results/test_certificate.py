@@ -242,8 +242,7 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly():
     hidden = extrapolated_limit([linear[0], linear[1], linear[1]], [0.0, 0.0, 0.0])
     assert hidden[1] == pytest.approx(3e-4, rel=1e-9)
     # the last value is moved by a ninth of the last change: so is what it may be wrong by
-    errors = [7e-3, 9e-4, 2e-4]
-    assert extrapolated_limit([0.25] * 3, errors)[1] == pytest.approx(
+    assert extrapolated_limit([0.25] * 3, [7e-3, 9e-4, 2e-4])[1] == pytest.approx(
         2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12
     )
 

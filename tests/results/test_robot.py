@@ -18,11 +18,9 @@ from colloc.verification.trajectory import plan_trajectory
 from tests.shared.mechanics import with_inertia
 
 SIZE = {"length": 1.2, "mass": 3.0, "period": 5.0}
-SLOW = SIZE | {"period": 5000.0}
-"""Where inertia does nothing."""
+SLOW = SIZE | {"period": 5000.0}  # where inertia does nothing
 QUANTITIES = {"torque": "N·m", "speed": "rad/s", "power": "W"}
-POINTS = 400
-"""A link."""
+POINTS = 400  # a link
 LENGTH, MASS, FROUDE = 1.2, 3.0, 1.0
 PERIOD = (LENGTH / 9.81 / FROUDE) ** 0.5
 SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
@@ -196,8 +194,7 @@ def test_peak_power_of_a_joint_is_the_most_it_drives_with_not_the_most_it_brakes
     assert robot.facts["peak_joint_power_W"] == pytest.approx(powers.max(axis=1))
     assert robot.facts["peak_power_W"] == pytest.approx(powers.sum(axis=0).max())
     for name, values in (("rms_torque_N_m", torques), ("rms_speed_rad_per_s", speeds)):
-        rms = np.sqrt((values[:, :-1] ** 2).mean(axis=1))
-        assert robot.facts[name] == pytest.approx(rms)
+        assert robot.facts[name] == pytest.approx(np.sqrt((values[:, :-1] ** 2).mean(axis=1)))
     limited = replace(braking, problem=braking.problem.with_(torque_limit=0.5))
     most = max(robot.facts["peak_torque_N_m"]) / robot.torque_unit
     assert limit_shares(limited)["torque"] == pytest.approx(most / 0.5, rel=1e-3)
@@ -270,8 +267,7 @@ def test_gravity_of_an_exported_model_leans_downhill_as_seen_from_its_tail(towar
     """Its part across the ground is the grade; the tail link lies along +x."""
     model = tmp_path / "model.xml"
     towards_left.export(model, length=LENGTH, mass=MASS, period=20.0)
-    stated = ElementTree.parse(model).find("option").get("gravity")
-    gravity = np.array(stated.split(), dtype=float)
+    gravity = np.array(ElementTree.parse(model).find("option").get("gravity").split(), dtype=float)
     assert np.linalg.norm(gravity) == pytest.approx(9.81)
     across = complex(*gravity[:2])
     assert abs(across) / -gravity[2] == pytest.approx(towards_left.problem.grade)

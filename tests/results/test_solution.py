@@ -176,8 +176,7 @@ def on_a_dense_grid(path, n=4000):
     alpha, later = theta[-1], np.append(t, 1.0)
     # periodic from axes that turn evenly; its primitive times e^(i alpha t) is the place
     seen = np.exp(1j * (theta[:-1] - alpha * t)) * centre
-    k = np.fft.fftfreq(n, 1 / n)
-    loop = np.fft.ifft(np.fft.fft(seen) / (1j * (2 * np.pi * k + alpha)))
+    loop = np.fft.ifft(np.fft.fft(seen) / (1j * (2 * np.pi * np.fft.fftfreq(n, 1 / n) + alpha)))
     return alpha, np.append(loop, loop[0]) * np.exp(1j * alpha * later)
 
 
@@ -210,8 +209,7 @@ def stated(case, turn, intervals=24):
 
 @pytest.mark.parametrize("case", CASES)
 def test_reduced_and_full_program_and_replay_agree_on_the_chord(case):
-    free = stated(case, None)
-    space, v = space_near(free, GAIT)
+    space, v = space_near(stated(case, None), GAIT)
     turn = ReducedProgram(space, DELTA).motion.values(v, DELTA)["rotation"]
     problem = stated(case, turn)
     space, v = space_near(problem, GAIT)

@@ -195,8 +195,7 @@ def test_in_slow_motion_the_work_is_that_against_friction_and_motors_have_no_lim
     asked = {"objective": "driven efficiency", "torque_limit": 0.1, "gait": Harmonic(1)}
     fast = Problem("fast", froude=0.1, **asked)
     slow = explore.in_slow_motion(fast)
-    said = slow.froude, slow.objective.name, slow.path_limits.names
-    assert said == (0.0, "efficiency", ())
+    assert (slow.froude, slow.objective.name, slow.path_limits.names) == (0.0, "efficiency", ())
     assert explore.in_slow_motion(fast.with_(grade=0.1)) is None
 
 

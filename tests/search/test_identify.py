@@ -274,8 +274,7 @@ def test_what_the_motion_does_not_tell_apart_is_named():
         ((1.0, 1.0), "mu_f from mu_t and mu_b: it does not change the motion."),
         ((1.0, -1.0), "mu_t and mu_b: the motion is the same with mu_t +11 %, mu_b -10 %."),
     ):
-        found = _Fit.describe(stated, np.array(direction))
-        assert found == f"This gait cannot distinguish {said}"
+        assert _Fit.describe(stated, np.array(direction)) == f"This gait cannot distinguish {said}"
 
 
 def test_a_record_without_a_path_is_refused(tmp_path):

@@ -71,8 +71,7 @@ def test_a_least_distance_is_reached_for_the_price_of_efficiency():
     assert far.certificate.distance == pytest.approx(least, rel=1e-4)
     assert far.certificate.efficiency < free.certificate.efficiency
     assert "least distance" in {check.name for check in far.certificate.checks}
-    stated = free.problem.with_(at_least={"distance": least})
-    assert far.problem.at_least == stated.at_least
+    assert far.problem.at_least == free.problem.with_(at_least={"distance": least}).at_least
 
 
 @pytest.mark.slow
@@ -83,8 +82,7 @@ def test_a_turning_gait_turns_by_the_prescribed_angle():
     assert solution.success
     gait, problem = solution.gait, solution.problem
     at = problem.body, problem.friction, gait, solution.delta_per_period
-    measured = replay(*at, instants=3000)
-    assert measured.rotation == pytest.approx(0.3, abs=1e-5)
+    assert replay(*at, instants=3000).rotation == pytest.approx(0.3, abs=1e-5)
     # of free gaits, one turns by more and for less work per angle
     free = solve(problem.with_(rotation=None, guess=gait), 1)
     assert free.success
@@ -213,8 +211,7 @@ def test_what_must_be_reached_is_stated_in_units_of_friction_too():
     assert (scaled.unit, scaled.dynamics.law.mu_t) == (1e-3, 1.0)
     assert [value for _, value in scaled.aims.at_least] == pytest.approx([0.15, 0.2])
     # what is proportional to no power of friction is left as it is
-    mixed = light.with_(objective="distance / (work + length)")
-    assert control_problem(mixed).unit == 1.0
+    assert control_problem(light.with_(objective="distance / (work + length)")).unit == 1.0
 
 
 @pytest.mark.parametrize("grade", [0.0, 0.1])
@@ -305,5 +302,4 @@ def test_of_a_distance_that_no_gait_goes_half_of_the_farthest_is_asked(
     stated = Problem("far", guess=ellipse(0, 2.86, 1.3), least_distance=asked)
     problem, known = with_reachable_distance(stated)
     assert known == begun
-    stated = problem.at_least
-    assert [(aim.name, level) for aim, level in stated] == [("distance", least)]
+    assert [(aim.name, level) for aim, level in problem.at_least] == [("distance", least)]

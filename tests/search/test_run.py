@@ -108,8 +108,7 @@ def test_so_does_the_command_after_a_signal(undisturbed, tmp_path, asked):
     said = process.communicate(timeout=60)[1]
     if process.returncode == 130 and (tmp_path / "quick.interrupted.h5").exists():
         assert "the same command goes on from there" in said
-    again = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "solved" in again.stdout
+    assert "solved" in subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert contents(tmp_path / "quick.h5") == wanted
     assert [each.name for each in tmp_path.iterdir()] == ["quick.h5"]
 
@@ -161,8 +160,7 @@ def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_b
         assert "A tiny gait is better still" in chosen.message
     assert choose(found.problem, [small]).answer is small.answer
     failed = replace(found, answer=replace(found.answer, value=9.0, optimal=False), message="why")
-    said = choose(found.problem, [failed, found]).message
-    assert "A gait of 9.0000 is not verified: why" in said
+    assert "A gait of 9.0000 is not verified: why" in choose(found.problem, [failed, found]).message
 
     def stopped(*at):
         active_run().solutions += [failed, found]

@@ -23,8 +23,7 @@ from colloc.system.errors import NotConvergedError
 USUAL = {"gait": Harmonic(1, "bilateral"), "mesh_tolerance": 1e-4}
 PROBLEM = Problem("wide", friction=Friction(mu_t=10, mu_f=1, mu_b=1), delta=1e-2, **USUAL)
 
-LONG = PROBLEM.with_(at_least={"length": 9.0})
-"""Without it the gaits are 7.3 to 8.3 radians long."""
+LONG = PROBLEM.with_(at_least={"length": 9.0})  # without it 7.3 to 8.3
 ONE_FLOOR = """
 from colloc import *
 PROBLEM = Problem("floor", friction=Friction(mu_t=10, mu_f=1, mu_b=1), gait=Harmonic(1, "bilateral"), delta=1e-2, mesh_tolerance=1e-4)

@@ -27,7 +27,14 @@ from colloc.results.comparison import reversed_in_time, swap_ends
 from colloc.results.solution import NOT_CONVERGED, SOLVED
 from colloc.studies import sweep as study_run
 from colloc.studies.study import read_study_file
-from colloc.studies.sweep import StudyRun, read_journal, save_study, start_key, study_table
+from colloc.studies.sweep import (
+    StudyRun,
+    read_journal,
+    run_chunk,
+    save_study,
+    start_key,
+    study_table,
+)
 from colloc.system.task_pool import Lost
 from colloc.verification.replay import replay
 
@@ -502,8 +509,9 @@ def test_the_name_of_a_gait_is_the_same_in_every_process():
 def test_the_command_says_what_it_found_and_goes_on_from_its_journal(
     fake, tmp_path, monkeypatch, capsys
 ):
-    run = partialmethod(StudyRun.run, executor=ThreadPoolExecutor)
+    run, chunks, solve = partialmethod(StudyRun.run, executor=ThreadPoolExecutor), [], run_chunk
     monkeypatch.setattr(StudyRun, "run", run)
+    monkeypatch.setattr(study_run, "run_chunk", lambda x: chunks.append(len(x)) or solve(x))
     words = ["--output", f"{tmp_path}/", "--chunk", "2"]
     for journal in (0, 2):
         assert sweep_study([str(study_file(tmp_path)), *words]) == 0
@@ -512,9 +520,10 @@ def test_the_command_says_what_it_found_and_goes_on_from_its_journal(
         assert ("round 0: 2 of 2, 0 s left)" in said) == (journal == 0)
         assert f"tiny: 2 cells: 2 solved; saved {tmp_path}/tiny.nc" in said
     assert load_study(tmp_path / "tiny.nc").attributes["source"] == FILE
-    none = FILE.replace("(1.0, 1.1)", "(3.0,)").replace("(1.0,)", "(2.0,)")
-    assert sweep_study([str(study_file(tmp_path, none)), *words, "--quiet"]) == 3
-    assert capsys.readouterr().out.startswith("tiny: 1 cells: 1 no verified gait; saved")
+    one = FILE.replace("(1.0, 1.1)", "(3.0,)").replace("(1.0,)", "(2.0, 2.1)")
+    assert sweep_study([str(study_file(tmp_path, one)), *words, "--quiet"]) == 3
+    assert capsys.readouterr().out.startswith("tiny: 2 cells: 1 no verified gait, 1 solved; saved")
+    assert max(chunks) == 2
 
 
 @pytest.mark.slow

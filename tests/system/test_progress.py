@@ -14,8 +14,7 @@ from colloc.commands.main import main as run
 from colloc.system.progress import StatusLine, duration
 from tests.shared.terminal import run_in_terminal, screen
 
-WIPED = "\x1b[1A\x1b[2K"
-"""Up to the line, and the line erased."""
+WIPED = "\x1b[1A\x1b[2K"  # up to the line, and the line erased
 QUICK = """
 from colloc import *
 PROBLEM = Problem("quick", ellipse(0.0, 2.8, 1.3), gait=Harmonic(1, "bilateral"), delta=1e-2, delta_start=1e-2)
@@ -47,8 +46,7 @@ COMMANDS = {
     "sensitivity": "quick.h5",
 }
 LONG = ("sweep", "multistart", "pareto", "steer", "identify", "robot", "sensitivity", "report")
-CLOCK = re.compile(r"   \d+ s(, about \d+ s left)?$")
-"""How a line of progress ends."""
+CLOCK = re.compile(r"   \d+ s(, about \d+ s left)?$")  # how a line of progress ends
 
 
 class Terminal(io.StringIO):

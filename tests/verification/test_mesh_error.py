@@ -98,8 +98,7 @@ def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, fri
 )
 def test_shares_of_intervals_add_up_to_the_error_of_other_objectives(objective):
     """The total is known from the scheme's own increments and the fine motion alone."""
-    stated = problem("trapezoid", objective=objective)
-    error = error_of(stated)
+    error = error_of(problem("trapezoid", objective=objective))
     assert abs(error.total) > 1e-4
     assert error.value.sum() == pytest.approx(error.total, rel=0.1)
 
@@ -187,8 +186,7 @@ def test_no_node_lies_where_friction_changes_its_sense(rule, friction, held, mon
     """Schemes with nodes at ends of intervals would give the efficiency a kink there."""
     stated, kink = problem(friction=friction, scheme=rule, intervals=8), 0.1234
     monkeypatch.setattr(refinement, "kink_phases", lambda *arguments: np.array([kink]))
-    plan = planned(stated, tolerance=1e-4)
-    assert (kink in plan.edges) == held
+    assert (kink in planned(stated, tolerance=1e-4).edges) == held
 
 
 def test_knots_on_kinks_save_points(monkeypatch):

@@ -118,8 +118,7 @@ def test_the_error_of_the_efficiency_is_made_of_those_of_distance_and_work():
 
 
 def test_the_best_polygon_that_is_known_is_replayed_at_its_value():
-    file = ROOT / "results/curated/many_corners.json"
-    stored = json.loads(file.read_text(encoding="utf-8"))
+    stored = json.loads((ROOT / "results/curated/many_corners.json").read_text(encoding="utf-8"))
     gait = Corners(stored["corners"], stored["symmetry"])
     assert len(gait.corner_phases) + 1 == 1940
     assert np.abs(gait.vertices).max() < 2.46

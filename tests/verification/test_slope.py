@@ -12,8 +12,7 @@ from colloc.gaits.regime import Regime
 from colloc.verification import differential_motion as motion
 from tests.shared.mechanics import coulomb, wrench
 
-SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])
-"""A gait without any symmetry."""
+SKEW = Fourier([0.3, -0.2], [[1.2], [0.3]], [[0.2], [1.0]])  # of no symmetry
 UNEQUAL = Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
 LOPSIDED = Chain((0.2, 0.5, 0.3), weights=(0.5, 0.2, 0.3))
 ON_FEET = Chain(
