@@ -74,10 +74,8 @@ def test_the_kernel_and_the_symbolic_statement_have_the_derivatives_of_differenc
     np.testing.assert_allclose(symbolic[0], value, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(symbolic[1], found, rtol=1e-9, atol=1e-9)
     for k, unit in enumerate(np.eye(len(given))[:, :, None]):
-        near, far = (
-            (stated(given + n * step * unit) - stated(given - n * step * unit)) / (2 * n)
-            for n in (1, 2)
-        )
+        by = step * unit
+        near, far = ((stated(given + n * by) - stated(given - n * by)) / (2 * n) for n in (1, 2))
         np.testing.assert_allclose(found[:, k], (4 * near - far) / (3 * step), rtol=1e-7, atol=1e-7)
 
 
@@ -193,6 +191,15 @@ def test_bodies_of_other_kinds_find_a_certified_gait(body, gait, froude):
     found = colloc.solve(colloc.Problem("paced", body=body, gait=gait, froude=froude), starts=8)
     assert found.status == "solved", found.message
     assert found.efficiency > 0.03
+
+
+def test_how_slow_is_slow_enough_follows_the_friction_of_the_feet():
+    feet = tuple(colloc.Foot(k, friction=UNEQUAL) for k in range(3))
+    own, oily = colloc.Chain(UNEVEN.lengths, feet=feet), colloc.Friction(mu_f=0.1)
+    known, found = (
+        colloc.slow_enough(*at, LEANING, 0.1) for at in ((STANDING, UNEQUAL), (own, oily))
+    )
+    assert found == pytest.approx(known, rel=1e-6)
 
 
 @pytest.fixture(scope="module")

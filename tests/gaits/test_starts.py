@@ -60,6 +60,14 @@ def test_without_a_guess_a_search_begins_where_the_body_moves_enough(speed, limi
     assert latin_hypercube_gait(problem, 0, 0).shape_speed > problem.smallest_shape_speed
 
 
+def test_starts_keep_the_speed_of_the_joints_and_a_swing_of_nine_degrees_to_either_side_is_seen():
+    slow = Problem("slow", gait=Harmonic(1), speed_limit=(4.0, 2.0))
+    for gait in (slow.guess, *(latin_hypercube_gait(slow, 0, k) for k in range(5))):
+        assert (np.abs(gait.rates(PHASES)).max(axis=1) <= np.multiply((4.0, 2.0), 1 + 1e-9)).all()
+    seen = [starts.is_visible(ellipse(0, np.radians(x), 0.01)) for x in (8.9, 9.1)]
+    assert seen == [False, True]
+
+
 @pytest.mark.parametrize(
     ("shape", "limit", "factor"),
     [
@@ -121,10 +129,8 @@ def test_a_truncated_path_that_overshoots_its_limits_starts_a_search_all_the_sam
 @pytest.mark.parametrize("symmetry", ["none", "bilateral"])
 @pytest.mark.parametrize("gait_class", [Harmonic, Polygon])
 def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class):
-    corners = {
-        "none": [[0.4, 0.5, 0.6], [0.2, 0.1, 0.3]],
-        "bilateral": [[0.4, 0.5, 0.45], [-0.4, -0.42, -0.45]],
-    }
+    corners = {"none": [[0.4, 0.5, 0.6], [0.2, 0.1, 0.3]]}
+    corners["bilateral"] = [[0.4, 0.5, 0.45], [-0.4, -0.42, -0.45]]
     small = Corners(np.array(corners[symmetry]), symmetry)
     laid = starts.to_class(Problem("short", body=THREE), gait_class(3, symmetry), small)
     assert laid.length == pytest.approx(0.2 * np.pi, rel=2e-3)
@@ -151,10 +157,8 @@ def test_a_richer_class_keeps_what_its_seed_had():
 
 @pytest.mark.slow
 def test_a_hexagon_is_an_octagon_with_corners_on_its_sides():
-    hexagon = Corners(
-        np.array([[2.58068, 3.11378, 2.97774, 2.81594], [-2.58068, -2.58089, -2.67289, -2.81594]]),
-        "bilateral",
-    )
+    half = [[2.58068, 3.11378, 2.97774, 2.81594], [-2.58068, -2.58089, -2.67289, -2.81594]]
+    hexagon = Corners(half, "bilateral")
     problem = Problem("six", hexagon, gait=Polygon(6, "bilateral"), intervals=60)
     solution = solve(warm_start(problem, hexagon, Polygon(8, "bilateral"), intervals=80), 1)
     assert solution.status == "solved"

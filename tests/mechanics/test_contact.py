@@ -75,11 +75,8 @@ def test_the_gap_between_links_is_that_of_their_points():
 def test_the_tangent_planes_of_the_minimum_lie_above_it_and_touch():
     rng = np.random.default_rng(2)
     first, second = rng.normal(size=(2, 500)) * 3 * touching.SMOOTHING
-    share, least, step = (
-        touching.share_of_first(first, second),
-        touching.smooth_minimum(first, second),
-        1e-8,
-    )
+    share, step = touching.share_of_first(first, second), 1e-8
+    least = touching.smooth_minimum(first, second)
     np.testing.assert_allclose(touching.tangent_of_minimum(first, second, share), least, atol=1e-15)
     other = touching.tangent_of_minimum(first, second, rng.permutation(share))
     assert np.all(other >= least - 1e-15)

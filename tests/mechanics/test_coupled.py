@@ -8,6 +8,7 @@ from colloc import Chain, Coupled, Friction, Harmonic, Problem, Quantity
 from colloc.gaits.gait_fields import CLASSES, fields, gait_from, part_from
 from colloc.mechanics.densities import LENGTH, Instants, JointMap
 from colloc.results.robot import joint_torques
+from colloc.transcription.shape_constraints import shape_checks
 from colloc.verification.adaptive_motion import whole_totals
 from tests.shared.cases import slow_but
 
@@ -65,9 +66,12 @@ def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_b
     np.testing.assert_allclose(now.angle, motors.angles(t))
     stuck = Coupled(Harmonic(1), gears=(*gears[:3], (0, 0)), stuck={3: 0.3})
     path = Problem("c", body=body, gait=stuck).joint_path(*motors(t))
-    np.testing.assert_allclose(
-        path, [[*x[:3], y + 0 * t] for x, y in zip(joints(t), (0.3, 0.0), strict=True)]
-    )
+    known = [[*x[:3], y + 0 * t] for x, y in zip(joints(t), (0.3, 0.0), strict=True)]
+    np.testing.assert_allclose(path, known)
+    checks = shape_checks(body, (), (9.0, 8.0), joints.joint_map)
+    found = checks.values(checks.n_shape + np.repeat([0, 1], 20), np.tile(joints.rates(t), 2))
+    known = motors.rates(t) / [[9.0], [8.0]]
+    np.testing.assert_allclose(found.reshape(2, 20), known, atol=1e-12)
     np.testing.assert_allclose(
         joints.joint_map.motor_rates(joints.angles(t) - joints.joint_map.offset), motors.angles(t)
     )

@@ -86,11 +86,8 @@ def test_a_clone_that_was_not_built_uses_the_kernel_that_was_installed(fresh):
     built = Path(library()._name)
     library.cache_clear()
     fresh.setattr(native_kernel_module, "find_spec", lambda name: None)
-    fresh.setattr(
-        metadata,
-        "distributions",
-        lambda name: [SimpleNamespace(locate_file=lambda folder: built.parent)],
-    )
+    installed = [SimpleNamespace(locate_file=lambda folder: built.parent)]
+    fresh.setattr(metadata, "distributions", lambda name: installed)
     assert native_kernel() is not None
 
 

@@ -114,10 +114,8 @@ def plain(body, q, rates, z):
     """Places, velocities ``(2, n_point, n_time)`` in the axes of Theta; tangents and normals."""
     s = S[:, None] * np.ones(q.shape[1])
     theta, turning = body.tangent(s, q), body.turning(s, q, rates) + z[2]
-    along, across = (
-        np.stack([np.cos(theta), np.sin(theta)]),
-        np.stack([-np.sin(theta), np.cos(theta)]),
-    )
+    along = np.stack([np.cos(theta), np.sin(theta)])
+    across = np.stack([-np.sin(theta), np.cos(theta)])
     place, moved = (
         cumulative_trapezoid(a, S, axis=1, initial=0) for a in (along, turning * across)
     )

@@ -333,9 +333,8 @@ def test_a_broken_balance_is_named_with_its_window(formulation, variable):
     result = solver.solve_within(x, 0.1, None, np.inf)
     text = explanation(program, result, 0.1)
     assert any(word in text for word in ("torque", "balance", "rotation", "rate", "friction"))
-    first, last, worst = map(
-        float, re.search(r"between phases (.*) and (.*), worst at (0\.\d+)", text).groups()
-    )
+    said = re.search(r"between phases (.*) and (.*), worst at (0\.\d+)", text)
+    first, last, worst = map(float, said.groups())
     assert first <= worst <= last < first + 0.3
     assert first < program.mesh.times[11] < last + 0.125
     assert "Try to" in text
