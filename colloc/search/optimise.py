@@ -214,8 +214,8 @@ def project_to_zero_rotation(problem: Problem, gait: AnyGait, delta: float) -> A
     level = {"gait": seeds, "guess": gait, "intervals": 30 + 4 * seeds.harmonics}
     level |= free_otherwise | {"grade": 0.0, "towards": None}
     if problem.regime.free:
-        level |= {"objective": EFFICIENCY, "froude": problem.regime.froude}
-    space, target = space_near(problem.with_(**level), gait)
+        level |= {"objective": EFFICIENCY, "froude": problem.regime.froude, "limits": ()}
+    space, target = space_near(problem.without_robot.with_(**level), gait)
     program, area = ReducedProgram(space, delta), enclosed_area(seeds, problem.body.n_joint)
     # limits of the angles are kept by the search that begins here
     program.place_rows(np.zeros_like(target))

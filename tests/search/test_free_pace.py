@@ -13,7 +13,7 @@ from colloc.reduced.motion import ReducedMotion
 from colloc.reduced.program import ReducedProgram
 from colloc.results.robot import joint_torques
 from colloc.search.iterate import space_near
-from colloc.search.optimise import optimise
+from colloc.search.optimise import optimise, project_to_zero_rotation
 from colloc.search.options import FINE
 from tests.shared.mechanics import with_inertia
 
@@ -53,6 +53,19 @@ def test_the_best_pace_is_that_of_the_best_fixed_one():
     assert values[2] == pytest.approx(found.value, rel=1e-9)
     assert values[2] > max(values) - 1e-12
     assert abs(values[3] - values[1]) / (2e-2 * values[2]) < 1e-3
+
+
+def test_a_start_of_a_robot_whose_period_is_sought_turns_no_longer():
+    robot = colloc.Robot(length=0.6, mass=1.0, period=(1.0, 5.0), max_speed=4.0, idle_power=1.0)
+    how = {"gait": colloc.Harmonic(1, "none"), "robot": robot}
+    stated = colloc.Problem("robot", body=BODY, friction=FRICTION, **how)
+
+    def turned(gait):
+        path, law = colloc.Fourier(gait.mean, gait.cos, gait.sin), BODY.law(stated.friction)
+        return abs(colloc.replay(BODY, law, path, 0.1, froude=stated.regime.froude).rotation)
+
+    closed = project_to_zero_rotation(stated, LEANING, 0.1)
+    assert turned(closed) < 1e-3 < turned(LEANING)
 
 
 def test_inertia_alone_decides_the_pace_of_the_efficiency_where_sideways_friction_is_small():
