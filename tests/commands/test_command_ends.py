@@ -326,8 +326,7 @@ def test_what_a_problem_file_and_its_parts_print_does_not_spoil_the_one_object(s
 def shell(line, folder):
     """Exit code (of the first of a pipe), output and errors of a line with colloc as a function."""
     program = f'colloc() {{ "{sys.executable}" -m colloc "$@"; }}; set -o pipefail; {line}'
-    words = ["bash", "-c", program]
-    done = subprocess.run(words, capture_output=True, text=True, cwd=folder)
+    done = subprocess.run(["bash", "-c", program], capture_output=True, text=True, cwd=folder)
     return done.returncode, done.stdout, done.stderr
 
 

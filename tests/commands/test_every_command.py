@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from colloc import save
+from colloc import ProblemError, save
 from colloc.commands.main import SUBCOMMANDS
 from colloc.commands.main import main as colloc
 from colloc.search.options import Tolerances
@@ -21,6 +21,10 @@ from colloc import *
 PROBLEM = Problem(name="quick", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0, 1.4, 0.8),
                   delta=0.3, delta_start=0.3, intervals=12, mesh_tolerance=1e-4)
 """
+
+
+CHANGES = {"delta": 0.01, "delta_start": 0.2, "intervals": 30, "mesh_tolerance": 1e-3}
+CHANGES |= {"scheme": "gauss-2", "formulation": "implicit velocity"}
 
 
 @pytest.fixture
@@ -182,6 +186,24 @@ def test_a_good_problem_is_solved_saved_and_drawn(tmp_path, capsys):
     assert "dry friction    between 0." in printed
     assert colloc(["verify", f"{tmp_path}/out/quick.h5"]) == 0
     assert "delta had to be lowered from 0.3" in printed
+
+
+def test_options_of_a_solve_are_what_the_search_is_asked_for(tmp_path, monkeypatch):
+    asked = {}
+
+    def resume(stated, path, *, progress, **how):
+        asked.update(how, **{name: getattr(stated.problem, name) for name in CHANGES})
+        raise ProblemError("enough")
+
+    monkeypatch.setattr("colloc.studies.solve.resume", resume)
+    (tmp_path / "p.py").write_text(GOOD, encoding="utf-8")
+    words = [
+        f"--{x.replace('_', '-').replace('intervals', 'mesh')}={y}" for x, y in CHANGES.items()
+    ]
+    how = {"starts": 5, "seconds": 7.0, "search": "full", "fresh": True}
+    words += ["--starts=5", "--seconds=7", "--search=full", "--fresh", f"--output={tmp_path}/"]
+    assert colloc(["solve", f"{tmp_path}/p.py", *words]) == 2
+    assert asked == CHANGES | how
 
 
 def test_a_failed_solve_is_kept_apart_and_replaces_no_good_result(tmp_path, capsys, monkeypatch):

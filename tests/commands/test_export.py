@@ -107,8 +107,7 @@ def test_torques_on_the_way_into_a_gait_come_to_be_those_of_the_gait(unsolved, t
 
 @pytest.mark.parametrize("how", ["crossing", "passing"])  # at samples, or between them
 def test_a_way_on_which_the_body_crosses_itself_is_refused(how, three_link, tmp_path, monkeypatch):
-    depth = np.array(0.01)
-    monkeypatch.setattr(f"colloc.pictures.export.{how}_depth", lambda body, angles: depth)
+    monkeypatch.setattr(f"colloc.pictures.export.{how}_depth", lambda body, angles: np.array(0.01))
     with pytest.raises(ProblemError, match="crosses itself on the way from straight"):
         three_link.export(tmp_path / "x.csv", period=4)
     three_link.export(tmp_path / "x.csv", period=4, ramp=False)

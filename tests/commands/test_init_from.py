@@ -186,8 +186,7 @@ def test_wheels_and_pads_come_back_from_mjcf(tmp_path):
     at = {"gait": Harmonic(1, "none"), "delta": 0.1, "mesh_tolerance": 1e-2}
     problem = Problem("there", body=Chain(feet=parts), **at)
     gait = colloc.Fourier(np.zeros(2), 0.6 * np.eye(2)[:, :1], 0.6 * np.eye(2)[:, 1:])
-    solution = colloc.evaluate(problem, gait)
-    solution.export(tmp_path / "robot.xml", period=4.0, length=0.8, mass=1.5)
+    colloc.evaluate(problem, gait).export(tmp_path / "robot.xml", period=4.0, length=0.8, mass=1.5)
     assert sorted(feet(read(tmp_path, None, kind="xml").body)) == sorted(feet(problem.body))
 
 

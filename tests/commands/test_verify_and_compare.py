@@ -207,8 +207,7 @@ def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_pa
 def test_a_limit_that_a_gait_reaches_is_never_said_not_to_matter(harmonics):
     rng = np.random.default_rng(harmonics)
     for _ in range(2):
-        waves = rng.normal(size=(2, 2, harmonics))
-        gait = Fourier(np.zeros(2), *waves)
+        gait = Fourier(np.zeros(2), *rng.normal(size=(2, 2, harmonics)))
         gait = gait.scaled(1.2 / np.abs(gait.angles(np.arange(500) / 500)).max())
         most = np.abs(gait.rates(np.arange(500) / 500)).max()
         stated = Problem("reached", gait=colloc.Harmonic(harmonics), delta=1e-2)

@@ -30,8 +30,7 @@ def test_every_picture_shows_the_body_where_it_is_then(three_link):
     # video wants even numbers
     assert (wide, tall % 2, {picture.shape for picture in drawn}) == (900, 0, {drawn[0].shape})
     scale = 0.68 * wide / (high - low)[0]
-    motion = three_link.sample(np.arange(6) / 2)
-    x, y = lab_outline(three_link.problem.body, motion)
+    x, y = lab_outline(three_link.problem.body, three_link.sample(np.arange(6) / 2))
     x_mid, y_mid = (0.5 * (each.min(axis=0) + each.max(axis=0)) for each in (x, y))
     room = tall - 0.13 * wide  # the lower part, of this height
     columns = 0.015 * wide + scale * (x_mid - low[0])

@@ -186,8 +186,7 @@ def test_a_script_draws_whatever_backend_is_named_and_one_that_there_is_stays(
     save(three_link, tmp_path / "one.h5")
     drawn = f"import os, {before}colloc; colloc.load('one.h5').plot().savefig('one.png')"
     asked = "print(matplotlib.rcParams['backend'] == 'svg', os.environ['MPLBACKEND'])"
-    script = f"{drawn}; import matplotlib; {asked}"
-    said = python("-c", script, folder=tmp_path, MPLBACKEND=backend)
+    said = python("-c", f"{drawn}; import matplotlib; {asked}", folder=tmp_path, MPLBACKEND=backend)
     assert (tmp_path / "one.png").exists()
     assert said == f"{backend == 'svg'} {backend}\n"
 

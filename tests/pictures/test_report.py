@@ -142,8 +142,7 @@ def test_everything_from_the_file_is_escaped(three_link):
 @pytest.mark.parametrize("n_link", slow_but([2, 3], [2, 3, 5, 8]))
 def test_chains_of_two_to_eight_links(n_link, unsolved):
     page = report_page(unsolved(crawler(n_link)))
-    seen = outline(page)
-    motion = json.loads(seen.scripts[0])
+    motion = json.loads(outline(page).scripts[0])
     assert len(motion["x"]) == n_link + 1
     assert len(motion["angles"]) == n_link - 1
     assert page.count('class="dot"') == min(n_link - 2, 6)
@@ -221,8 +220,7 @@ def test_a_notebook_shows_a_card_with_a_film_of_two_periods(three_link):
     # the second period repeats the first one, a distance further on
     moved = np.linalg.norm(steps, axis=2)
     np.testing.assert_allclose(moved, scale * three_link.measured.distance, atol=0.3)
-    start = three_link.sample(0.0)
-    up = lab_outline(three_link.problem.body, start)[1, :, 0]
+    up = lab_outline(three_link.problem.body, three_link.sample(0.0))[1, :, 0]
     np.testing.assert_allclose(drawn[0, :, 1] - drawn[0, 0, 1], scale * (up[0] - up), atol=0.3)
     failed = Solution(three_link.problem, replace(three_link.answer, optimal=False))
     assert "not converged" in " ".join(outline(failed._repr_html_()).text)

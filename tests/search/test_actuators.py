@@ -93,8 +93,7 @@ def test_a_joint_that_idles_counts_as_driven_by_half_of_what_delta_hides(law):
     """So the driven power is smooth there: half of any power is gained, whichever way."""
     (angles, rates), delta = random_instants(20), 1e-2
     idle = law.largest * delta ** (1 + law.degree)
-    forces = BODY.forces(law, angles, rates, np.zeros((3, 20)), delta)
-    held = joint_moments(BODY, angles, forces)
+    held = joint_moments(BODY, angles, BODY.forces(law, angles, rates, np.zeros((3, 20)), delta))
 
     def driven(share):
         return DRIVEN_WORK.at(Instants(BODY, law, angles, share * rates, delta, moments=held))[0]
@@ -181,8 +180,7 @@ def test_weak_motors_cost_efficiency_and_keep_their_limit_between_the_nodes(free
     assert weak.efficiency < 0.95 * free.efficiency
     shares = replay(Chain(), Friction(), weak.gait, 1e-4, instants=6400, limits=ONE).shares
     assert shares[2:].max() == pytest.approx(0.6, rel=1e-4)
-    check = next(c for c in weak.certificate.checks if c.name == "actuators")
-    assert check.passed
+    assert next(c for c in weak.certificate.checks if c.name == "actuators").passed
 
 
 def test_a_certificate_fails_a_gait_whose_joints_do_more_than_they_can(weak):
@@ -393,8 +391,7 @@ def swept_maximum(centre, width, n=120):
         on_edge = np.column_stack([grid[:, 0], direction * (np.pi - np.abs(grid[:, 0]))[:, None]])
         near = np.abs(on_edge - centre).max(axis=1) <= width
         grid = np.concatenate([grid, on_edge[near]])
-        value = efficiencies(grid, n)
-        centre = grid[np.argmax(value)]
+        centre = grid[np.argmax(efficiencies(grid, n))]
         width *= 0.35
     return efficiencies(centre[None], 960)[0], centre
 

@@ -157,8 +157,7 @@ def test_the_flatter_the_slope_the_nearer_it_is_to_the_level():
 @pytest.fixture(scope="module")
 def found():
     at = {"grade": 0.05, "froude": 0.03, "mesh_tolerance": 1e-3}
-    stated = uphill(body=colloc.Chain(), friction=colloc.Friction(), **at)
-    return colloc.solve(stated, starts=1)
+    return colloc.solve(uphill(body=colloc.Chain(), friction=colloc.Friction(), **at), starts=1)
 
 
 def test_a_gait_is_found_and_certified_and_kept(found, tmp_path):

@@ -239,8 +239,7 @@ def test_a_path_of_another_body_is_not_explained(crawled, tmp_path):
     path = recorded(tmp_path / "a.csv", crawled)
     rows = np.loadtxt(path, delimiter=",", skiprows=1)
     rows[:, 3] += 0.3 * np.sin(rows[:, 0])
-    head = path.read_text().split("\n")[0]
-    np.savetxt(path, rows, "%.9g", ",", header=head, comments="")
+    np.savetxt(path, rows, "%.9g", ",", header=path.read_text().split("\n")[0], comments="")
     assert "No coefficients reproduce the path" in str(colloc.identify(FLOOR, path))
 
 

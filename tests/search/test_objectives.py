@@ -43,8 +43,7 @@ def test_the_fastest_gait_is_faster_and_less_efficient_and_the_replay_says_so(fa
     assert measured.value == measured.distance / measured.values["length"]
     assert measured.value == pytest.approx(best.value, abs=best.value_error)
     assert fast.value == pytest.approx(best.value, rel=1e-4)
-    t = np.linspace(0, 1, 200_001)
-    length = np.linalg.norm(np.diff(fast.gait.angles(t)), axis=0).sum()
+    length = np.linalg.norm(np.diff(fast.gait.angles(np.linspace(0, 1, 200_001))), axis=0).sum()
     assert measured.values["length"] == pytest.approx(length, rel=1e-8)
     assert best.value > SPEED(known.values) + 100 * best.value_error
     assert best.efficiency < known.efficiency - 100 * known.efficiency_error
@@ -113,8 +112,7 @@ def test_no_energy_comes_back_from_a_joint_that_is_driven_backwards():
     assert found.value <= found.efficiency
     usual = solve(problem.with_(objective="efficiency", guess=solution.gait), 1)
     at = problem.body, problem.friction, usual.gait, 1e-3
-    known = replay(*at, objective=problem.objective)
-    assert solution.value >= known.value * (1 - 1e-6)
+    assert solution.value >= replay(*at, objective=problem.objective).value * (1 - 1e-6)
 
 
 def test_every_joint_has_a_limit_of_its_own():
@@ -162,8 +160,7 @@ def test_the_first_line_of_a_gait_that_nobody_sees_says_so(three_link):
     assert summary_dict(solution, None, None, None)["tiny"]
     assert "tiny gait" in summary_lines(solution, None)[0]
     one_moves = colloc.Fourier([0.0, 0.0], [[1.0], [0.01]], [[0.0], [0.01]])
-    seen = replace(three_link, answer=replace(three_link.answer, gait=one_moves))
-    assert not seen.is_tiny
+    assert not replace(three_link, answer=replace(three_link.answer, gait=one_moves)).is_tiny
 
 
 def stated(*mu, **changes):

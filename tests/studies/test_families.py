@@ -271,8 +271,7 @@ def test_the_table_holds_the_joint_angles_of_every_gait(family):
     np.testing.assert_array_equal(table["joint_angles_rad"], known)
     assert family.begins[1] == 0
     assert table["radius_body_lengths"][1] is None
-    works = table["work_per_period_weight_times_length"]
-    assert works == [point.work for point in family.points]
+    assert table["work_per_period_weight_times_length"] == [point.work for point in family.points]
 
 
 def test_gaits_begin_where_they_are_nearest_to_their_neighbours():

@@ -275,8 +275,7 @@ def test_what_a_net_rotation_could_add_to_the_distance_does_not_count():
     turned = replay(*at, turning, stated.delta, instants=200, tolerance=1e-3)
     assert 0.5 * abs(turned.rotation) > turned.distance > 0.01
     assert study_run.value_of(stated.with_(objective="towing"), turning) == 0.0
-    again = replay(*at, study_run.member(stated, gait), stated.delta)
-    assert abs(again.rotation) < 1e-4
+    assert abs(replay(*at, study_run.member(stated, gait), stated.delta).rotation) < 1e-4
 
 
 def test_a_start_that_turns_as_it_should_is_worth_the_same_whatever_phase_it_begins_at():
@@ -509,10 +508,11 @@ def test_the_name_of_a_gait_is_the_same_in_every_process():
 def test_the_command_says_what_it_found_and_goes_on_from_its_journal(
     fake, tmp_path, monkeypatch, capsys
 ):
-    run, chunks, solve = partialmethod(StudyRun.run, executor=ThreadPoolExecutor), [], run_chunk
-    monkeypatch.setattr(StudyRun, "run", run)
+    pools, chunks, solve = [], [], run_chunk
+    pool = lambda workers: pools.append(workers) or ThreadPoolExecutor(workers)  # noqa: E731
+    monkeypatch.setattr(StudyRun, "run", partialmethod(StudyRun.run, executor=pool))
     monkeypatch.setattr(study_run, "run_chunk", lambda x: chunks.append(len(x)) or solve(x))
-    words = ["--output", f"{tmp_path}/", "--chunk", "2"]
+    words = ["--output", f"{tmp_path}/", "--chunk", "2", "--workers", "3"]
     for journal in (0, 2):
         assert sweep_study([str(study_file(tmp_path)), *words]) == 0
         said = capsys.readouterr().out
@@ -523,7 +523,7 @@ def test_the_command_says_what_it_found_and_goes_on_from_its_journal(
     one = FILE.replace("(1.0, 1.1)", "(3.0,)").replace("(1.0,)", "(2.0, 2.1)")
     assert sweep_study([str(study_file(tmp_path, one)), *words, "--quiet"]) == 3
     assert capsys.readouterr().out.startswith("tiny: 2 cells: 1 no verified gait, 1 solved; saved")
-    assert max(chunks) == 2
+    assert (max(chunks), {*pools}) == (2, {3})
 
 
 @pytest.mark.slow

@@ -169,13 +169,11 @@ def test_a_point_that_nearly_rests_makes_a_kink_up_to_thirty_delta(least, counts
         return (0.3 + least * late + 2000 * late**3 / 3)[None], (least + 2000 * late**2)[None]
 
     at = slowing(np.array([0.25]))
-    z = body.solve(friction, *at, delta).z
-    velocity = body.velocity(body.posture(at[0]), at[1], z)
+    velocity = body.velocity(body.posture(at[0]), at[1], body.solve(friction, *at, delta).z)
     slow = body.contact.sticking_speeds(friction, velocity).min() / delta
     assert slow == pytest.approx(8.55 * least, rel=0.01)
     fine = fine_motion(body, friction, slowing, delta, np.linspace(0, 0.5, 21), 1e-6)
-    near = np.abs(kink_phases(body, friction, slowing, delta, fine) - 0.25) < 0.01
-    assert near.any() == counts
+    assert (np.abs(kink_phases(body, friction, slowing, delta, fine) - 0.25) < 0.01).any() == counts
 
 
 @pytest.mark.parametrize(
@@ -245,8 +243,7 @@ def test_a_refined_solution_knows_its_scheme_and_its_error():
     answer = answer_near(stated)
     assert answer.optimal
     assert answer.scheme == answer.mesh.scheme.name != "gauss-2"
-    gait = answer.gait
-    known = replay(stated.body, stated.friction, gait, DELTA, tolerance=1e-8)
+    known = replay(stated.body, stated.friction, answer.gait, DELTA, tolerance=1e-8)
     assert abs(answer.efficiency / known.efficiency - 1) < 1e-5
 
 

@@ -49,8 +49,7 @@ class Roughly(Chain):
 
 
 def test_what_the_balance_leaves_over_is_part_of_the_error_that_is_asked_for():
-    gait = ellipse(0.0, 2.8, 1.3)
-    at = Friction(), gait, 1e-3
+    at = Friction(), ellipse(0.0, 2.8, 1.3), 1e-3
     found, exact = (replay(b, *at, instants=40, tolerance=1e-4) for b in (Roughly(), Chain()))
     assert 0.9e-4 < found.error <= 1e-4
     assert found.instants > exact.instants
@@ -182,8 +181,7 @@ def test_stated_errors_cover_a_kink_wherever_it_lies(share):
 def test_corners_are_not_taken_for_kinks():
     """Beside a jump the power is linear: nothing is left, though the instants do not fit."""
     assert stated_work(panels_of(lambda t: np.where(t < 0.5, 1 + t, 3 - t), corner=0.5)) < 1e-14
-    kept_in_view = panels_of(lambda t: np.where(t < 0.51, 1 + t, 3 - t))
-    assert stated_work(kept_in_view) > 1e-3
+    assert stated_work(panels_of(lambda t: np.where(t < 0.51, 1 + t, 3 - t))) > 1e-3
 
 
 def test_changes_that_are_kept_are_those_that_would_be_found_again():
