@@ -186,10 +186,8 @@ def test_a_bound_says_whether_the_last_climbs_still_found_more(monkeypatch):
         return found
 
     monkeypatch.setattr(sampled, "climb_from_lattice", kept)
-    few, enough = (
-        efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=Budget(8, (1,), 64, 1, n))
-        for n in (1, 24)
-    )
+    budgets = (Budget(8, (1,), 64, 1, n) for n in (1, 24))
+    few, enough = (efficiency_bound(Chain((0.4, 0.6)), Friction(), budget=b) for b in budgets)
     assert (few.converged, enough.converged) == (False, True)
     assert few.sampled > 1.05 * enough.sampled
     # and is what a check finds that knows nothing of its samples

@@ -81,6 +81,8 @@ READ = {
     "rounded stamps": ("t,q1,q2,q3\n" + table(np.round(SECONDS, 1), A, B, C), "rounded to 0.1 taken as equal steps"),
     "equal stamps": ("t,q1,q2,q3\n" + table(np.floor(SECONDS), A, B, C), "rounded to 1 taken as equal steps"),
     "angles without a sign": ("t,q1_deg,q2_deg,q3_deg\n" + table(SECONDS, D % 360, E % 360, F % 360), "whole turns taken out"),
+    "two with numbers": ("t,j1,j2,wrist\n" + table(SECONDS, A, B, C), "in the file's order, tail to head"),
+    "other columns": ("t,q1,q2,q3,load1,load2,temp1,temp2\n" + table(SECONDS, A, B, C, A, B, C, A), "ignored: load1, load2, temp1 and 1 more"),
     "times called otherwise": ("Uhr,Gelenk1,Gelenk2,Gelenk3\n" + table(SECONDS, A, B, C), "time from Uhr"),
 }
 REFUSED = {
@@ -111,6 +113,9 @@ REFUSED = {
     "two samples": ("t,a,b,c\n0,0,0,0\n1,1,0,0\n", "holds 2 samples"),
     "nothing": ("", "holds 0 samples"),
     "degrees without a word": ("t,a,b,c\n0,0,0,0\n1,90,0,0\n2,0,90,0\n5,0,0,0\n6,0,0,0\n7,0,0,0\n8,0,0,0\n", "an angle of 90 rad .*: if angles are degrees, say so"),
+    "two with numbers": ("t,j2,j1,wrist\n" + table(SECONDS, A, B, C), "the order of the columns j2, j1, wrist is not clear"),
+    "no number, no names": (table(SECONDS, A, B, C).replace("\n2,", "\n2,E!", 1), "line 31, column 2: .* is no number"),
+    "degrees without names": (table(SECONDS, A, 50 * B, C), r"rad \(column 3\)"),
     "another column": ("t,q1_deg,q2_deg,q3_deg\n" + table(SECONDS, *20 * DEGREES), "is it the right column"),
     "no names, a joint less": (table(A, B), "it has 1 column of angles, and the body has 3 joints"),
     "another time": ("t,q1,q2,q3\n" + table([f"31.01. {k}h" for k in range(60)], A, B, C), "line 2: the time .* write seconds"),

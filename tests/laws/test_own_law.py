@@ -91,10 +91,8 @@ def test_it_is_solved_certified_kept_and_read(monkeypatch, tmp_path):
     assert found.status == "solved", found.message
     read = load(save(found, tmp_path / "greased.h5"))
     assert (read.problem.law, read.certificate) == (Greased(), found.certificate)
-    same, dry = (
-        replay(problem.body, law, found.gait, 1e-2)
-        for law in (OwnLaw(*Greased().formulas), Friction(mu_t=2.0))
-    )
+    laws = OwnLaw(*Greased().formulas), Friction(mu_t=2.0)
+    same, dry = (replay(problem.body, law, found.gait, 1e-2) for law in laws)
     assert found.efficiency == pytest.approx(same.efficiency, rel=1e-6)
     assert found.efficiency < dry.efficiency
 

@@ -34,10 +34,8 @@ def gait_motion(body, gait):
     def wide(s, t):
         return np.broadcast_to(s, (len(s), t.size))
 
-    angle, rate = (
-        lambda s, t, part=part: body.tangent(wide(s, t), part(t))
-        for part in (gait.angles, gait.rates)
-    )
+    parts = gait.angles, gait.rates
+    angle, rate = (lambda s, t, part=part: body.tangent(wide(s, t), part(t)) for part in parts)
     return Motion(angle, rate, stages=(0.0, 0.5), antipodal=True)
 
 

@@ -263,10 +263,8 @@ def test_isotropic_crawler_scales_as_the_paper_says():
     """d ~ epsilon, W_inner ~ epsilon^2, W_outer/d -> 1, 1 - efficiency ~ epsilon; above 0.99 at
     epsilon = 0.0025."""
     epsilons = (0.01, 0.005, 0.0025)
-    periods = [
-        ONE.with_(epsilon=e, delta=delta_for(e)).period(intervals=1, quadrature_tolerance=1e-8)
-        for e in epsilons
-    ]
+    how = {"intervals": 1, "quadrature_tolerance": 1e-8}
+    periods = [ONE.with_(epsilon=e, delta=delta_for(e)).period(**how) for e in epsilons]
     for found, order, off in (
         ([p.d for p in periods], 1, 0.01),
         ([p.W_inner for p in periods], 2, 0.02),
