@@ -309,6 +309,7 @@ robot(length=62.0) -> 62 metres.*write length=0.62
 robot(mass=0.0) -> mass must be a number
 robot(period=(3.0, 2.0)) -> the shortest and the longest
 robot(idle_power=-1.0) -> idle_power must be a number from 0
+robot(backlash=-0.1) -> backlash must be a number from 0
 Problem("x", robot=robot(), froude=0.1) -> froude follows from the robot
 Problem("x", robot={"length": 1}) -> robot must be a Robot
 solve_balance(*AT, ONES, ONES, 0.0) | solve_balance(*AT, ONES, ONES, -1e-4) | solve_balance(*AT, ONES, ONES, np.nan) -> delta
@@ -361,6 +362,7 @@ fitted_friction(SAMPLES, length=-1.0, period=2.0) -> length
 Problem("x", friction=DRAG, gait=Polygon(6)) | Problem("x", friction=PowerLaw(0.5), gait=Polygon(6)) -> work depends on the pace under .*; use Harmonic
 Problem("x", body=Chain((0.5, 0.5)), friction=DRAG, gait=Harmonic(2)) -> scallop theorem
 OwnLaw("vs/speed", "-vn/speed") | OwnLaw("-vs/speed", "-vn/speed + 0.1*vn/speed*exp(speed)") | OwnLaw("-vs/speed", "0.1*vn/(1 + speed)") | OwnLaw("1", "-vn/speed") -> does not oppose the motion
+OwnLaw("3*vs/speed", "-vn/speed") -> the force \(-?2\.99, .* does not oppose
 OwnLaw("0", "-vn/speed") -> nothing resists
 OwnLaw("-vs/sqrt(vs**2 + delta**2)", "-vn/sqrt(vn**2 + delta**2)") | OwnLaw("-vs", "-tanh(vn/delta)") -> state a wheel's friction as Axle
 OwnLaw("-vs/abs(vs + 1) - where(vs < 0, 0, 1e-9)", "-vn") -> rest

@@ -149,6 +149,10 @@ def test_free_hinges_across_are_wheels_and_spheres_under_a_box_feet(tmp_path):
     body = read(tmp_path, [*stands, *WORM[3:]]).body
     assert [foot.place for foot in body.feet] == pytest.approx([0.3, 0.25, 0.3])
     assert read(tmp_path, [*stands, *WORM[3:]], "--wheels").body.feet[0].kind == "wheel"
+    # a wheel beyond the box is where the link ends
+    how, lengths = ("0.13 0 0", "0 1 0", "continuous", ""), np.array([0.1, 0.12, 0.13]) / 0.35
+    rolls = [*stands, *WORM[3:], link("wheel", 0.01), joint("axle", "head", "wheel", *how)]
+    assert read(tmp_path, rolls).body.lengths == pytest.approx(lengths)
     assert len(read(tmp_path, [*stands, *WORM[3:]], "--feet", "2").body.feet) == 6
 
 
