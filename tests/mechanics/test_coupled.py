@@ -55,6 +55,12 @@ def test_joints_move_at_the_rates_of_their_angles_also_where_a_motor_turns_one_b
     np.testing.assert_allclose(Coupled(Harmonic(2)).parameters(own), p)
     joints = Coupled(Harmonic(1), gears=gears).driven_by(colloc.ellipse(0.1, 0.7, 0.6), 4)
     motors = joints.motor_gait
+    rng = np.random.default_rng(1)
+    hops = [
+        joints.basis.perturb(joints, 0.2, 0, rng).angles(t) - joints.angles(t) for _ in range(50)
+    ]
+    np.testing.assert_allclose(np.array(hops)[:, 1], -0.5 * np.array(hops)[:, 0], atol=1e-12)
+    assert np.std([hop[3].mean() for hop in hops]) == pytest.approx(0.2, rel=0.3)
     slopes = (joints.angles(t + h) - joints.angles(t - h)) / (2 * h)
     np.testing.assert_allclose(joints.rates(t), slopes, atol=1e-7)
     np.testing.assert_allclose(joints.angles(t)[1], -0.5 * motors.angles(t)[0], atol=1e-12)
@@ -126,6 +132,7 @@ def test_its_sensitivity_is_to_the_chain_that_it_moves(broken):
 
 
 def test_it_is_kept_in_files(tmp_path, broken):
+    assert Coupled(Harmonic(1, "antipodal"), gears=GEARS).with_symmetry("none") == BELTS
     for gait in (BELTS, BROKEN):
         assert part_from(CLASSES, fields(gait)) == gait
     t = np.linspace(0, 1, 9)
