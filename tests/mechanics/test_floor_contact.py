@@ -63,10 +63,7 @@ def test_pads_from_end_to_end_are_the_line(law, weights):
     np.testing.assert_allclose(own, known, rtol=1e-12, atol=1e-14)
 
 
-BENT = (
-    np.array([[0.9, -0.4, 0.3], [0.2, -1.1, 1.4]]),
-    np.array([[1.0, -0.5, 0.8], [-0.6, 1.2, 0.4]]),
-)
+BENT = np.array([[[0.9, -0.4, 0.3], [0.2, -1.1, 1.4]], [[1.0, -0.5, 0.8], [-0.6, 1.2, 0.4]]])
 
 
 def wheels_that_do_not_slip(body, angles, rates):
@@ -100,10 +97,8 @@ def test_turned_wheels_left_and_right_go_straight_on(angle):
     """Across them acts the sum of what each has across itself."""
     feet = (Wheel(k, angle=side * angle, rolling=0.1) for k in range(3) for side in (1, -1))
     body, c, s = Chain(LENGTHS, feet=tuple(feet)), np.cos(angle), np.sin(angle)
-    ahead, aside = (
-        body.sliding(EQUAL, STILL, STILL, np.array(z)[:, None], 1e-9).force[:2, 0]
-        for z in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    )
+    ways = np.array([[[1.0], [0.0], [0.0]], [[0.0], [1.0], [0.0]]])
+    ahead, aside = (body.sliding(EQUAL, STILL, STILL, z, 1e-9).force[:2, 0] for z in ways)
     np.testing.assert_allclose(ahead, [-(0.1 * c**2 + s**2), 0.0], atol=1e-8)
     np.testing.assert_allclose(aside, [0.0, -(0.1 * s**2 + c**2)], atol=1e-8)
 
@@ -116,10 +111,8 @@ def test_forwards_of_a_foot_is_towards_the_head_and_turned_round_its_law_is_back
         assert body.sliding(EQUAL, STILL, STILL, z, 1e-9).force[0, 0] == pytest.approx(force)
     np.testing.assert_allclose(sliding_force(turned, EQUAL), sliding_force(back, EQUAL), atol=1e-12)
     # and is that of the body where all feet have it
-    own, theirs = (
-        solve_balance(body, law, *random_instants(10), 1e-2).require().z
-        for body, law in ((ahead, EQUAL), (on_each(lambda k: Foot(k, 0.3)), AHEAD))
-    )
+    both = (ahead, EQUAL), (on_each(lambda k: Foot(k, 0.3)), AHEAD)
+    own, theirs = (solve_balance(*at, *random_instants(10), 1e-2).require().z for at in both)
     np.testing.assert_allclose(own, theirs, rtol=0, atol=1e-8)
 
 
@@ -302,10 +295,8 @@ def test_friction_of_a_foot_is_in_units_of_the_weight_whatever_the_problem_says(
     z, same, again = (solve_balance(wheels, own, angles, rates, 1e-3).z for own in (*laws, law))
     np.testing.assert_array_equal(z, same)
     np.testing.assert_allclose(z, again, atol=1e-9)
-    stated, resolved = (
-        replay(wheels, law, KNOWN, 1e-2, tolerance=1e-4, instants=200)
-        for law in (Friction(), one.law)
-    )
+    how = {"tolerance": 1e-4, "instants": 200}
+    stated, resolved = (replay(wheels, law, KNOWN, 1e-2, **how) for law in (Friction(), one.law))
     assert stated.work == resolved.work
 
 
