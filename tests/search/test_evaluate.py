@@ -71,7 +71,7 @@ def test_points_of_the_body_tell_its_angles_and_how_far_it_went(time, tmp_path):
     assert "250 of them a body length" in found.message
     went = float(re.search(r"went ([\d.]+) body lengths per cycle", found.message)[1])
     assert went == pytest.approx(0.05, rel=0.01)
-    assert f"predicted {found.distance:.3g} +- " in found.message
+    assert f", sideways; predicted {found.distance:.3g} +- " in found.message
     assert found.message.endswith(f"{found.travels}.")
 
 
@@ -255,7 +255,7 @@ def test_a_series_that_misses_its_samples_states_its_lack_of_fit():
     assert enough.certificate.efficiency_error < 1e-6 < 1e3 * enough.certificate.efficiency_error
 
 
-def test_errors_of_samples_are_in_units_of_friction_and_kept_and_no_disagreement(tmp_path):
+def test_errors_of_samples_are_in_units_of_friction_and_kept_and_no_disagreement(tmp_path, capsys):
     noisy = GAIT.angles(np.arange(N) / N) + 0.01 * np.random.default_rng(0).normal(size=(2, N))
     path = colloc.save(colloc.evaluate(QUICK, noisy), tmp_path / "x.h5")
     loaded = colloc.load(path)
@@ -265,6 +265,7 @@ def test_errors_of_samples_are_in_units_of_friction_and_kept_and_no_disagreement
     by_friction = loaded.certificate.of_samples * np.array([0.01, 0.01, 1.0, 100.0])
     np.testing.assert_allclose(rough.certificate.of_samples, by_friction, rtol=1e-3)
     assert main(["verify", str(path), "--quiet"]) == 0
+    assert f"+- {loaded.certificate.value_error:.0e} by replay" in capsys.readouterr().out
     # of motors, too, whatever turn of theirs is one of a joint, but for what is tried at random
     geared = QUICK.with_(gait=colloc.Coupled(colloc.Harmonic(1), gears=((0, -2), (1, 0))))
     driven = colloc.evaluate(geared, noisy[::-1] * [[1.0], [-0.5]]).certificate.of_samples

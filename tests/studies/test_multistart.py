@@ -274,6 +274,8 @@ def test_the_command_line_solves_in_processes_resumes_and_reports(tmp_path, caps
     assert "holds starts of another problem" in complaint
     path.write_text(FILE, encoding="utf-8")
     assert len(kept().outcomes) == 6
+    kept().add({name(1, 1): outcome(1, gait=ROUND, status=ERROR)})
+    assert "1 starts done already, 1 to go" in run("--starts", 2, "--seed", 1, "--retry")[1]
 
 
 class _Enough(Exception):

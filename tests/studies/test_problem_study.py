@@ -223,6 +223,7 @@ def test_a_good_basin_found_anywhere_spreads_everywhere(fake, tmp_path, monkeypa
     assert certified[2, 1] == 0 < tried[2, 1]
     assert (np.delete(certified.ravel(), 7) == np.delete(tried.ravel(), 7)).all()
     assert not table["below_neighbour"].any()
+    assert missing(StudyRun(run.study, tmp_path, retry=True)) == []  # that cell had no error
 
 
 def test_a_cell_below_what_a_neighbours_gait_achieves_is_marked(fake, tmp_path, monkeypatch):
@@ -511,6 +512,8 @@ def test_the_command_says_what_it_found_and_goes_on_from_its_journal(
     pools, chunks, solve = [], [], run_chunk
     pool = lambda workers: pools.append(workers) or ThreadPoolExecutor(workers)  # noqa: E731
     monkeypatch.setattr(StudyRun, "run", partialmethod(StudyRun.run, executor=pool))
+    made = lambda *at, retry: pools.append(retry) or StudyRun(*at)  # noqa: E731
+    monkeypatch.setattr(study_run, "StudyRun", made)
     monkeypatch.setattr(study_run, "run_chunk", lambda x: chunks.append(len(x)) or solve(x))
     words = ["--output", f"{tmp_path}/", "--chunk", "2", "--workers", "3"]
     for journal in (0, 2):
@@ -521,9 +524,9 @@ def test_the_command_says_what_it_found_and_goes_on_from_its_journal(
         assert f"tiny: 2 cells: 2 solved; saved {tmp_path}/tiny.nc" in said
     assert load_study(tmp_path / "tiny.nc").attributes["source"] == FILE
     one = FILE.replace("(1.0, 1.1)", "(3.0,)").replace("(1.0,)", "(2.0, 2.1)")
-    assert sweep_study([str(study_file(tmp_path, one)), *words, "--quiet"]) == 3
+    assert sweep_study([str(study_file(tmp_path, one)), *words, "--quiet", "--retry"]) == 3
     assert capsys.readouterr().out.startswith("tiny: 2 cells: 1 no verified gait, 1 solved; saved")
-    assert (max(chunks), {*pools}) == (2, {3})
+    assert (max(chunks), {*pools}) == (2, {3, False, True})
 
 
 @pytest.mark.slow
