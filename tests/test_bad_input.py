@@ -364,7 +364,8 @@ Problem("x", body=Chain((0.5, 0.5)), friction=DRAG, gait=Harmonic(2)) -> scallop
 OwnLaw("vs/speed", "-vn/speed") | OwnLaw("-vs/speed", "-vn/speed + 0.1*vn/speed*exp(speed)") | OwnLaw("-vs/speed", "0.1*vn/(1 + speed)") | OwnLaw("1", "-vn/speed") -> does not oppose the motion
 OwnLaw("3*vs/speed", "-vn/speed") -> the force \(-?2\.99, .* does not oppose
 OwnLaw("0", "-vn/speed") -> nothing resists
-OwnLaw("-vs/sqrt(vs**2 + delta**2)", "-vn/sqrt(vn**2 + delta**2)") | OwnLaw("-vs", "-tanh(vn/delta)") -> state a wheel's friction as Axle
+OwnLaw("-vs/sqrt(vs**2 + delta**2)", "-vn/sqrt(vn**2 + delta**2)") -> by vs is dry.*state a wheel's friction as Axle
+OwnLaw("-vs", "-tanh(vn/delta)") -> by vn is dry.*state a wheel's friction as Axle
 OwnLaw("-vs/abs(vs + 1) - where(vs < 0, 0, 1e-9)", "-vn") -> rest
 OwnLaw("-vs/(speed - speed)", "-vn") -> no finite value
 OwnLaw("-vs/speed", "where(vs > 0, -2, -1.5)*vn/speed") -> jumps where vs changes its sign

@@ -112,6 +112,8 @@ def test_a_large_gait_is_admissible_in_any_chain(lengths):
     angles = laid.angles(np.linspace(0, 1, 2001))
     assert np.abs(angles).max() <= np.pi
     assert crossing_depth(Chain(lengths), angles).max() == 0
+    narrow = to_body(ellipse(0, 2.8, 1.3), THREE, Chain(lengths), 1.0).angles(PHASES)
+    assert 0.9 < np.abs(narrow).max() <= 1.0
     np.testing.assert_allclose(angles, -angles[::-1, ::-1], rtol=0, atol=1e-12)
 
 

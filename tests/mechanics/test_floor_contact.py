@@ -84,9 +84,7 @@ def test_a_wheeled_snake_tends_to_its_nonholonomic_kinematics_like_rolling_over_
         wheel = {"rolling": 0.02, "sideways": 0.02 * ratio}
         body = Chain(feet=tuple(Wheel(link, **wheel) for link in range(3)))
         z = solve_balance(body, EQUAL, *BENT, 1e-9).require().z
-        known = [
-            wheels_that_do_not_slip(body, *at) for at in zip(*np.swapaxes(BENT, 1, 2), strict=True)
-        ]
+        known = [wheels_that_do_not_slip(body, *at) for at in BENT.transpose(2, 0, 1)]
         errors.append(np.abs(z - np.transpose(known)).max())
     np.testing.assert_allclose(np.log10(np.divide(errors[:-1], errors[1:])), 1.0, atol=0.1)
     assert errors[-1] < 2e-3
@@ -241,9 +239,7 @@ def test_wheels_that_roll_freely_or_hold_firmly_do_not_slip(wheel):
     any small ratio."""
     body = on_axles(**wheel)
     z = colloc.solve_balance(body, Friction(), *BENT, 1e-3).require().z
-    known = [
-        wheels_that_do_not_slip(body, *at) for at in zip(*np.swapaxes(BENT, 1, 2), strict=True)
-    ]
+    known = [wheels_that_do_not_slip(body, *at) for at in BENT.transpose(2, 0, 1)]
     np.testing.assert_allclose(z, np.transpose(known), atol=1e-8)
 
 
