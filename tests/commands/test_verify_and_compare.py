@@ -200,6 +200,7 @@ def test_the_numbers_of_the_one_object_are_the_certified_ones(three_link, tmp_pa
     for name in ("value", "efficiency", "distance", "work"):
         assert facts[name] == facts["certificate"][name] == getattr(three_link.certificate, name)
     assert facts["shrunk"] == three_link.certificate.value
+    assert [x["value"] for x in facts["others"]] == [x.value for x in three_link.others]
     assert facts["swings_rad"] == pytest.approx([2 * np.hypot(2.8593, 1.3015)] * 2, rel=1e-4)
 
 

@@ -163,6 +163,9 @@ def found():
 def test_a_gait_is_found_and_certified_and_kept(found, tmp_path):
     assert found.status == "solved", found.message
     assert {check.name for check in found.certificate.checks} >= {"stability", "net rotation"}
+    begun = found.from_rest(np.array([0.0, 3.0, 4.0]))
+    assert begun.theta[0] == pytest.approx(found.gait.theta)
+    assert np.diff(begun.centre[0])[1] == pytest.approx(found.distance, rel=0.02)
     read = colloc.load(colloc.save(found, tmp_path / "gliding.h5"))
     assert read.problem.regime == Regime(grade=0.05, froude=0.03)
     assert (read.certificate, read.gait.theta) == (found.certificate, found.gait.theta)
