@@ -25,21 +25,6 @@ PROBLEM = Problem(name="quick", gait=Harmonic(1, "bilateral"), guess=ellipse(0.0
 
 CHANGES = {"delta": 0.01, "delta_start": 0.2, "intervals": 30, "mesh_tolerance": 1e-3}
 CHANGES |= {"scheme": "gauss-2", "formulation": "implicit velocity"}
-
-
-@pytest.fixture
-def place(three_link, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    save(three_link, tmp_path / "good.h5")
-    (tmp_path / "folder.py").mkdir()
-    texts = {"text.h5": "hello", "fails.py": "1 / 0\n", "empty.py": "x = 1\n", "study.py": STUDY}
-    texts["wave.py"] = PROBLEM.replace("gait=Harmonic(1, 'bilateral')", "body=Wave('sine')")
-    four = PROBLEM.replace("gait", "body=Chain((0.25,) * 4), gait")
-    for name, text in {**texts, "problem.py": PROBLEM, "four.py": four}.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    return tmp_path
-
-
 REFUSED = """
 init | nowhere/below.py | new.py --links x
 init x.txt -> end in .py
@@ -114,6 +99,32 @@ steer | nope.py | fails.py | empty.py | good.h5 | problem.py --turn 200 | proble
 pareto | nope.py | fails.py | empty.py | good.h5 | problem.py --points 1 | problem.py --objectives speed no
 sensitivity | nope.h5 | text.h5 | problem.py | good.h5 --no-such
 """
+BAD_PROBLEMS = {
+    "x = 1": "states no PROBLEM",
+    "PROBLEM = 3": "PROBLEM must be a Problem",
+    "a = 1\nb = = 2": "line 2",
+    "a = 1\n\nb = 1/0": "line 3",
+    "import sys\nsys.exit(0)": "p.py, line 2: the file ends the program",
+    "x = 1\nraise SystemExit": "p.py, line 2: the file ends the program",
+    "x = 1\nraise GeneratorExit": "p.py, line 2: ",
+    "x = 1\nraise type('Own', (BaseException,), {})('no')": "p.py, line 2: ",
+    "x = 1\nraise BaseExceptionGroup('x', [GeneratorExit()])": "p.py, line 2: ",
+    GOOD.replace("delta=0.3", "delta=-1e-4"): "delta must be a positive finite number",
+    GOOD.replace('"quick"', '"../quick"'): "name must be",
+}
+
+
+@pytest.fixture
+def place(three_link, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    save(three_link, tmp_path / "good.h5")
+    (tmp_path / "folder.py").mkdir()
+    texts = {"text.h5": "hello", "fails.py": "1 / 0\n", "empty.py": "x = 1\n", "study.py": STUDY}
+    texts["wave.py"] = PROBLEM.replace("gait=Harmonic(1, 'bilateral')", "body=Wave('sine')")
+    four = PROBLEM.replace("gait", "body=Chain((0.25,) * 4), gait")
+    for name, text in {**texts, "problem.py": PROBLEM, "four.py": four}.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
 
 
 def contents(folder):
@@ -146,21 +157,6 @@ def test_bad_input_is_refused_in_one_sentence_and_as_one_json_object(name, place
         known = {"status": "error", "message": sentence, "exit_code": 2}
         assert json.loads(said[1].out) == known, words
     assert contents(place) == before
-
-
-BAD_PROBLEMS = {
-    "x = 1": "states no PROBLEM",
-    "PROBLEM = 3": "PROBLEM must be a Problem",
-    "a = 1\nb = = 2": "line 2",
-    "a = 1\n\nb = 1/0": "line 3",
-    "import sys\nsys.exit(0)": "p.py, line 2: the file ends the program",
-    "x = 1\nraise SystemExit": "p.py, line 2: the file ends the program",
-    "x = 1\nraise GeneratorExit": "p.py, line 2: ",
-    "x = 1\nraise type('Own', (BaseException,), {})('no')": "p.py, line 2: ",
-    "x = 1\nraise BaseExceptionGroup('x', [GeneratorExit()])": "p.py, line 2: ",
-    GOOD.replace("delta=0.3", "delta=-1e-4"): "delta must be a positive finite number",
-    GOOD.replace('"quick"', '"../quick"'): "name must be",
-}
 
 
 @pytest.mark.parametrize("text", BAD_PROBLEMS, ids=lambda text: BAD_PROBLEMS[text])

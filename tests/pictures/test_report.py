@@ -34,6 +34,21 @@ NO_SLIDERS = {
     "nine": (Fourier(np.zeros(8), np.full((8, 1), 0.1), np.eye(8, 1)), Chain((1 / 9,) * 9)),
     "feet": (ellipse(0.0, 1.0, 1.0), Chain((1 / 3,) * 3, feet=1), Friction(), Harmonic(1)),
 }
+needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
+STAGE = """
+const made = [], elements = {}, lists = LISTS, texts = TEXTS;
+const element = id => elements[id] ||= {
+  textContent: texts[id] || "", value: "1", checked: true, dataset: {}, style: {}, clientWidth: 6000, clientHeight: 2000, addEventListener() {},
+  getContext: () => new Proxy({}, { get: (_, name) => (...at) => made.push([name, ...at]) }),
+};
+for (const each of Object.values(lists).flat()) Object.assign(each, { style: {}, addEventListener() {}, nextElementSibling: {} });
+globalThis.document = { documentElement: element("page"), addEventListener() {}, getElementById: element, querySelectorAll: what => lists[what] };
+globalThis.window = {
+  matchMedia: () => ({ matches: true, addEventListener() {} }), getComputedStyle: () => ({ getPropertyValue: () => "black" }),
+  requestAnimationFrame() {}, addEventListener() {}, location: { hash: "HASH" },
+};
+"""
+FLOORS = [(3, (1, 1, 1)), (5, (3, 1, 1)), (8, (2, 0.5, 1.5)), (2, (1, 0.3, 0.9))]
 
 
 class Outline(HTMLParser):
@@ -251,23 +266,6 @@ def test_feet_that_hold_are_filled_in_the_film_of_a_card(found):
     assert summary_dict(found, None, None, None)["feet_hold"] == pytest.approx(shares)
     colours = re.findall('stroke="(#.{6})" stroke-width="8"', found._repr_html_())
     assert colours == ["#d55e00", "#009e73", "#d55e00"]  # a wheel is green
-
-
-needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
-STAGE = """
-const made = [], elements = {}, lists = LISTS, texts = TEXTS;
-const element = id => elements[id] ||= {
-  textContent: texts[id] || "", value: "1", checked: true, dataset: {}, style: {}, clientWidth: 6000, clientHeight: 2000, addEventListener() {},
-  getContext: () => new Proxy({}, { get: (_, name) => (...at) => made.push([name, ...at]) }),
-};
-for (const each of Object.values(lists).flat()) Object.assign(each, { style: {}, addEventListener() {}, nextElementSibling: {} });
-globalThis.document = { documentElement: element("page"), addEventListener() {}, getElementById: element, querySelectorAll: what => lists[what] };
-globalThis.window = {
-  matchMedia: () => ({ matches: true, addEventListener() {} }), getComputedStyle: () => ({ getPropertyValue: () => "black" }),
-  requestAnimationFrame() {}, addEventListener() {}, location: { hash: "HASH" },
-};
-"""
-FLOORS = [(3, (1, 1, 1)), (5, (3, 1, 1)), (8, (2, 0.5, 1.5)), (2, (1, 0.3, 0.9))]
 
 
 def played(page, of, after, lists=None, hash=""):

@@ -12,6 +12,7 @@ from colloc.search.sensitivity import _again, sensitivity
 WAYS = ("sideways", "forwards", "backwards")
 OWN = colloc.OwnLaw()
 MIRRORED = (colloc.Foot(0, 0.2), colloc.Foot(1), colloc.Foot(2, 0.8))
+BILATERAL, STEEP = colloc.Harmonic(1, "bilateral"), colloc.Friction(mu_t=1, mu_f=1, mu_b=2)
 
 
 @pytest.fixture(scope="module")
@@ -223,9 +224,6 @@ def test_formulas_of_a_law_of_ones_own_are_no_numbers(stated):
     names = [each.name for each in parameters(colloc.Problem("x", **stated))]
     assert "delta" in names
     assert not any("friction" in name or "drag" in name for name in names)
-
-
-BILATERAL, STEEP = colloc.Harmonic(1, "bilateral"), colloc.Friction(mu_t=1, mu_f=1, mu_b=2)
 
 
 @pytest.mark.parametrize(
