@@ -151,6 +151,8 @@ class Corners(GaitFunction):
 
     def lines(self) -> list[str]:
         first, n = f"path of length {self.length:.4f} rad", self.corners.shape[1]
+        if self.symmetry != NONE:
+            first += f", {self.symmetry}: vertices of half of it"
         if n > _MOST_LISTED:
             return [f"{first}, {n} vertices", *self.pointing]
         vertices = (", ".join(f"{a:+.4f}" for a in corner) for corner in self.corners.T)
