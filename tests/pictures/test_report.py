@@ -247,6 +247,7 @@ def test_a_problem_stated_in_a_program_is_printed_as_a_file_that_states_it(three
     (tmp_path / "stated.py").write_text(stated, encoding="utf-8")
     assert colloc.load_problem(tmp_path / "stated.py").hash == three_link.problem.hash
     assert "save the problem source above" in text
+    assert "# links of mine" in report_page(replace(three_link, source="N = 3  # links of mine\n"))
 
 
 @pytest.fixture(scope="module")

@@ -181,7 +181,10 @@ def test_a_gait_on_file_that_goes_less_far_than_is_asked_says_so(
     monkeypatch.setattr("colloc.search.sensitivity.optimise", lambda *at: None)
     monkeypatch.setattr("colloc.search.sensitivity.finish", lambda *at: three_link)
     asked = three_link.problem.with_(at_least={"distance": part * three_link.distance})
-    assert _again(three_link, asked, 0.1).breaks == says
+    again, at = _again(three_link, asked, 0.1), (asked.body, asked.law, three_link.gait)
+    assert again.breaks == says
+    kept = colloc.replay(*at, asked.delta)
+    assert again.kept_error == pytest.approx(kept.error * kept.value, rel=0.1)
 
 
 def test_feet_that_have_to_be_alike_move_together():
