@@ -158,6 +158,9 @@ def test_as_many_starts_are_tried_as_are_asked_for_else_as_the_file_states(tmp_p
             words = ["solve", str(path), "--output", str(to), *(f"--starts={n}" for n in given)]
             assert main(words) == 2
     assert asked == [None] * 3 + [5] * 3 + [3] * 3 + [5] * 3
+    for given, tried in (([], 3), (["--starts=5"], 5)):
+        assert main(["steer", str(path), "--output", str(tmp_path / "p.json"), *given]) == 2
+        assert asked[-1] == tried
 
 
 def test_progress_is_told_and_printed_only_if_asked(capsys):
