@@ -128,13 +128,6 @@ def test_the_body_ends_where_the_samples_take_it(three_link, tmp_path):
     assert stated["end_turned_deg"] == pytest.approx(np.degrees(theta[-1]), abs=0.3)
 
 
-def test_a_lead_in_keeps_the_speed_that_the_problem_allows_in_a_period(unsolved, tmp_path):
-    bent = Fourier([1.0, -1.0], [[0.1], [0.0]], [[0.0], [0.1]])
-    solution = unsolved(Problem("bent", bent, gait=Harmonic(1), speed_limit=1.0))
-    quick, slow = (solution.export(tmp_path / "x.csv", period=s, rate=100) for s in (1.0, 4.0))
-    assert slow["ramp_s"] == pytest.approx(4 * quick["ramp_s"], rel=0.01)
-
-
 def test_with_inertia_the_body_ends_where_one_run_through_all_samples_takes_it(unsolved, tmp_path):
     """From rest, through more periods than are followed until all are alike."""
     bent, body = Fourier([1.0, -1.0], [[0.1], [0.0]], [[0.0], [0.1]]), Chain()
