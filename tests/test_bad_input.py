@@ -562,6 +562,7 @@ froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(2)
 froude=0.1, body=Chain((0.5, 0.5)), gait=Harmonic(1, "antipodal"), grade=0.1
 delta_start=0.0
 gait=Coupled(Harmonic(1, "antipodal"), gears=UNEVEN), body=FIVE
+gait=Coupled(Basis([ellipse(0, 1, 1).angles(np.arange(64) / 64), ellipse(0, 1, 1).angles(np.arange(16, 80) / 64)]), gears=UNEVEN), body=FIVE
 """
 
 
