@@ -341,7 +341,8 @@ class _Samples(NamedTuple):
         u, s, v = np.linalg.svd(twice.columns(time), full_matrices=False)
         variance = (residuals**2).sum(axis=1) / freedom * correlation_time(residuals)
         deviation = np.sqrt(variance) + _TINY
-        root = (v.T / s)[first:].T  # a row for each direction
+        # the symmetric root of the covariance, as rounding decides about another's directions
+        root = ((v.T / s) @ v)[first:].T
         each = deviation[:, None] * np.eye(joints)
         directions = np.einsum("jk,ri->jrki", each, root).reshape(-1, joints, root.shape[1])
         if fit.chosen:
