@@ -120,7 +120,7 @@ def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_pa
 @pytest.mark.parametrize(
     ("name", "settings", "words"),
     [
-        ("x.csv", {"period": 4}, ["--period", "4"]),
+        ("x.csv", {"period": 4}, ["--period", "4s"]),
         ("x.json", {"max_speed": [2, 1], "rate": 20}, ["--max-speed", "2", "1", "--rate", "20"]),
     ],
 )

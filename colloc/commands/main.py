@@ -10,6 +10,7 @@ import contextlib
 import importlib
 import io
 import json
+import math
 import os
 import re
 import sys
@@ -56,6 +57,17 @@ SUBCOMMANDS = {
 _EXIT_CODES = """\
 Exit codes: 0 success; 1 different (--compare); 2 bad problem, option or file; 3 nothing found; 4 a
 certificate failed; 130 interrupted."""
+_ANGLES = {"rad": 1.0, "deg": math.pi / 180}
+_UNITS = {
+    "length": {"m": 1.0, "cm": 0.01, "mm": 0.001},
+    "mass": {"kg": 1.0, "g": 0.001},
+    "period": {"s": 1.0, "ms": 0.001},
+    "max_speed": {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30},
+    "max_torque": {"Nm": 1.0, "mNm": 0.001},
+    "idle_power": {"W": 1.0, "mW": 0.001},
+    "backlash": _ANGLES,
+    "joint_limit": _ANGLES,
+}
 _LONGEST_NAME = 220  # bytes; systems allow 255, and temporary files have longer names
 _MOST = 2**63 - 1
 Option = tuple[str, dict[str, Any]]
@@ -182,6 +194,20 @@ def option(
     return name, {"help": help, "type": read, "default": default, **more}
 
 
+def in_units(name: str) -> Callable[[str], float]:
+    """Reader of a number that may end in a unit of what it is; without one it is in the first."""
+    units = _UNITS[name]
+
+    def read(text):
+        match = re.fullmatch(r"\s*([-+.\deE]*[\d.])\s*([A-Za-z/]*)\s*", text)
+        if not match or match[2] not in {"", *units}:
+            what = f"must be a number, or one in {' or '.join(units)}, not {text!r}"
+            raise argparse.ArgumentTypeError(what)
+        return float(match[1]) * units.get(match[2], 1.0)
+
+    return read
+
+
 def output(what: str) -> Option:
     return option(str, "--output PATH", what)
 
@@ -213,16 +239,22 @@ PROBLEM = (
     *CHANGES,
 )
 """The problem file, and the changes to it that every solving command takes."""
+LENGTH = option(
+    in_units("length"), "--length M", "of the stretched robot [m] (default: the problem's)", least=0
+)
 ROBOT = (
-    option(float, "--length M", "length of the stretched robot [m] (default: the problem's)"),
-    option(float, "--mass KG", "mass of the robot [kg] (default: the problem's)"),
+    LENGTH,
+    option(in_units("mass"), "--mass KG", "of the robot [kg] (default: the problem's)", least=0),
     option(float, "--gravity G", "default: the problem's, or 9.81 m/s^2"),
 )
-PERIOD = option(float, "--period S", "seconds per cycle")
+PERIOD = option(in_units("period"), "--period S", "seconds per cycle", least=0)
 MAX_SPEED, MAX_TORQUE = (
-    option(float, name, f"limit of the joints [{unit}]: one for all or one each", nargs="+")
-    for name, unit in (("--max-speed V", "rad/s"), ("--max-torque M", "N m"))
-)
+    option(in_units(name), signature, f"limit of the joints [{unit}]: one for all or one each",
+           least=0, nargs="+")
+    for name, signature, unit in (
+        ("max_speed", "--max-speed V", "rad/s"), ("max_torque", "--max-torque M", "N m")
+    )
+)  # fmt: skip
 
 
 def _attribute(option: Option) -> str:

@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 _ROLLING = 0.05  # resistance of a small wheel on a plain bearing, over its load
 _FEWEST, _MOST, _LONGER = 3, 12, 1e6  # links, and the longest over the shortest
 _LARGEST, _ALIKE = 3.14, 1e-6  # angle of a joint [rad], difference of like densities
-_ANGLES = {"rad": 1.0, "deg": math.pi / 180}
 _MANY_INTERVALS, _SECONDS_PER_INTERVAL = 1000, 0.02
 EXIT = {
     SOLVED: cli.OK,
@@ -45,36 +44,16 @@ EXIT = {
     CERTIFICATE_FAILED: cli.FAILED,
     INTERRUPTED: cli.INTERRUPTED,
 }
-_SI: dict[str, tuple[dict[str, float], str, str]] = {
-    "length": ({"m": 1.0, "cm": 0.01, "mm": 0.001}, "M", "length of the stretched robot [m]"),
-    "mass": ({"kg": 1.0, "g": 0.001}, "KG", "mass of the robot [kg]"),
-    "period": (
-        {"s": 1.0, "ms": 0.001},
-        "S",
-        "seconds per cycle; or the shortest and the longest to search",
-    ),
-    "max_speed": (
-        {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30},
-        "V",
-        "speed limit of the joints [rad/s]",
-    ),
-    "max_torque": ({}, "M", "torque limit of the joints [N m]"),
-    "idle_power": ({}, "P", "power of the electronics [W]"),
-    "backlash": (_ANGLES, "ANGLE", "backlash of the joints [rad]"),
+_SI = {
+    "length": ("M", "length of the stretched robot [m]"),
+    "mass": ("KG", "mass of the robot [kg]"),
+    "period": ("S", "seconds per cycle; or the shortest and the longest to search"),
+    "max_speed": ("V", "speed limit of the joints [rad/s]"),
+    "max_torque": ("M", "torque limit of the joints [N m]"),
+    "idle_power": ("P", "power of the electronics [W]"),
+    "backlash": ("ANGLE", "backlash of the joints [rad]"),
 }
-"""What a robot is stated by: units of its option, and what they are."""
-
-
-def _in_units(units: dict[str, float]) -> Callable[[str], float]:
-    """Reader of a number that may end in one of these units; without one it is in the first."""
-
-    def read(text):
-        match = re.fullmatch(r"\s*([-+.\deE]*[\d.])\s*([a-z/]*)\s*", text)
-        if not match or match[2] not in {"", *units}:
-            raise ValueError(text)
-        return float(match[1]) * units.get(match[2], 1.0)
-
-    return read
+"""What a robot is stated by: what stands for its value, and what it is."""
 
 
 @cli.command(
@@ -90,20 +69,20 @@ def _in_units(units: dict[str, float]) -> Callable[[str], float]:
     cli.flag("--wheels", "a wheel in the middle of each link"),
     cli.option(float, "--mu MU", "coefficient of friction (default: the file's, or 1)", least=0),
     cli.option(
-        _in_units(_ANGLES),
+        cli.in_units("joint_limit"),
         "--joint-limit ANGLE",
         f"largest angle of a joint [rad] (default: {_LARGEST})",
         least=0,
     ),
     *(
         cli.option(
-            _in_units(units),
+            cli.in_units(name),
             f"--{name.replace('_', '-')} {metavar}",
             what,
             least=0,
             **({"nargs": "+"} if name == "period" else {}),
         )
-        for name, (units, metavar, what) in _SI.items()
+        for name, (metavar, what) in _SI.items()
     ),
 )
 def init(options: argparse.Namespace) -> int:
@@ -136,7 +115,11 @@ def init(options: argparse.Namespace) -> int:
         raise ProblemError(f"a problem file is a Python file: {path.name} should end in .py.")
     mu = options.mu or (model and model.mu) or 1.0
     robot, wheels = _stated_robot(options, model), bool(options.wheels)
-    feet = options.feet or ""
+    feet, most = options.feet or "", options.joint_limit or 0.0
+    if most > math.pi:
+        raise ProblemError(
+            f"--joint-limit is at most pi [rad], not {most:g}; write degrees as 85deg."
+        )
     if model and model.feet and not (wheels or feet):
         feet = f"({', '.join(model.feet)})".format(mu=mu, rolling=_ROLLING)
     limit, weights = f"{options.joint_limit or _LARGEST:.6g}", list[float]()
@@ -167,9 +150,9 @@ def init(options: argparse.Namespace) -> int:
         raise ProblemError(f"{path} is there already; choose another name.") from None
     try:
         read_problem_file(path)
-    except ProblemError:
+    except ProblemError as error:
         path.unlink()
-        raise
+        raise ProblemError(re.sub(r".*, line \d+: ", "", str(error))) from None
     facts: dict[str, Any] = {"status": "written", "file": str(path), "links": links}
     lines = [f"wrote {path}: a problem of {links} links. Change it, then: colloc solve {path}"]
     if model:
@@ -415,7 +398,7 @@ def evaluate(options: argparse.Namespace) -> int:
 
 @cli.command(
     *_OF_A_GAIT,
-    cli.option(float, "--length M", "length of the robot [m] (default: the problem's)", least=0),
+    cli.LENGTH,
     cli.option(float, "--mu-forward MU", "the forward coefficient, measured separately", least=0),
 )
 def identify(options: argparse.Namespace) -> int:

@@ -125,6 +125,10 @@ def stated_names(path: str | os.PathLike[str], kind: str) -> tuple[Path, dict[st
             f"{path} is a results file (HDF5), not a {kind} file in Python; colloc report or "
             f"verify reads it, and colloc solve MINE.py --start {path} begins with its gait."
         )
+    if path.suffix != ".py":
+        model = path.suffix in (".urdf", ".xml")
+        cure = f"colloc init MINE.py --from {path} makes one" if model else "one comes first"
+        raise ProblemError(f"{path} is no {kind} file in Python (.py); {cure}.")
     if size > LONGEST_TEXT:
         raise ProblemError(_too_long(str(path), size))
     try:

@@ -31,7 +31,7 @@ init x.txt -> end in .py
 init problem.py -> is there already
 init a,b.py -> letters, digits
 init new.py --links 2 -> 3 to 12
-init new.py --feet 99 -> 0 (a line) to 20
+init new.py --feet 99 -> colloc: body.feet must be 0 (a line) to 20
 init | new.py --links 1 1e-9 1
 solve | folder.py | fails.py | empty.py | text.h5
 solve nope.py -> there is no problem file
@@ -90,9 +90,11 @@ export good.h5 --period 4 --clamp 500 -> clamp of servos must be pairs of a low 
 export good.h5 --period 4 --clamp 2500 500 -> clamp of servos must be pairs of a low and a high number
 export good.h5 --period 4 --scale 1 2 3 -> scale of servos is given for 3 joints of 2
 evaluate | problem.py | problem.py nope.csv | nope.py text.h5 | problem.py text.h5 | problem.py text.h5 --period x
+evaluate text.h5 problem.py -> text.h5 is no problem file in Python (.py); one comes first.
 evaluate problem.py good.h5 -> good.h5 is no text of numbers in UTF-8: a CSV file is read here
 identify | problem.py | problem.py nope.csv | nope.py text.h5 | problem.py text.h5 | problem.py text.h5 --length 0
 robot | nope.h5 --length 1 --mass 1 --period 1 | good.h5 | good.h5 --length 1 --mass 1
+robot good.h5 --max-speed -1 -> --max-speed must be positive, not -1.0
 robot | good.h5 --length 0 --mass 1 --period 1 | good.h5 --length 1 --mass nan --period 1
 robot | good.h5 --length 1 --mass 1 --period -5 | good.h5 --length 1 --mass 1 --period 1 --max-torque 1 2 3
 steer | nope.py | fails.py | empty.py | good.h5 | problem.py --turn 200 | problem.py --turn x | problem.py --output x.txt

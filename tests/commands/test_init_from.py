@@ -335,8 +335,8 @@ def test_a_body_that_differs_from_both_ends_is_given_gaits_that_it_can_have(tmp_
 
 
 def test_a_robot_in_si_units_is_stated_whatever_units_are_typed(tmp_path):
-    words = "--links 22 30 30 22 --mu 0.3 --joint-limit 85deg --max-torque 1.2"
-    words += " --idle-power 2 --backlash 1deg --length {} --mass {} --period {} --max-speed {}"
+    words = "--links 22 30 30 22 --mu 0.3 --joint-limit 85deg --max-torque 1200mNm"
+    words += " --idle-power 2W --backlash 1deg --length {} --mass {} --period {} --max-speed {}"
     sizes = f"0.62 0.9 60 {2 * math.pi}", "62cm 900g 60000ms 60rpm", "620mm 0.9kg 60s 360deg/s"
     typed = [words.format(*each.split()) for each in sizes]
     problems = [stated(tmp_path / f"{k}.py", each) for k, each in enumerate(typed)]
@@ -358,7 +358,8 @@ def test_a_robot_in_si_units_is_stated_whatever_units_are_typed(tmp_path):
         ("--length 62 --mass 1 --period 2", "write length=0.62"),
         ("--length 0.62", "--mass and --period are missing"),
         ("--links 3.5", "whole number of links"),
-        ("--joint-limit 85grad", "must be a number"),
+        ("--joint-limit 85grad", "must be a number, or one in rad or deg, not '85grad'"),
+        ("--joint-limit 85", "--joint-limit is at most pi [rad], not 85; write degrees as 85deg"),
     ],
 )
 def test_what_looks_mistyped_is_asked_about(words, says, tmp_path, capsys):
