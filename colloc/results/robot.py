@@ -226,10 +226,15 @@ class RobotSheet:
         problem, froude = self.solution.problem, self.solution.froude
         if froude and abs(self.froude / froude - 1.0) > _SAME_PACE:
             needed = math.sqrt(self.length / (self.pressing * froude))
+            cure = f"froude={self.froude:.4g}"
+            if problem.robot is not None:
+                of_robot = stated_robot(self.solution)
+                changes = (f"{x}={y:.4g}" for x, y in sizes.items() if y != of_robot[x])
+                cure = f"{', '.join(changes)} in its robot"
             raise ProblemError(
                 f"{problem.name} is the best gait for the Froude number {froude:.4g}: a robot of "
                 f"{self.length:g} m needs {needed:.4g} s per cycle, not {self.period:g} s: "
-                f"solve again with froude={self.froude:.4g}."
+                f"solve again with {cure}."
             )
         paced = problem.froude or not rate_independent(problem.law)
         for name in ("max_speed", "max_torque"):
@@ -340,23 +345,23 @@ class RobotSheet:
                 if rate_independent(problem.law):
                     slow = self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH))
                     facts["slow_enough_period_s"] = math.sqrt(slow)
+        for name, unit in (("speed", "rad_per_s"), ("torque", "N_m")):
+            if (limits := getattr(self, f"max_{name}")) is not None:
+                facts[f"max_{name}_{unit}"] = limits.tolist()
+                facts[f"{name}_used"] = (facts[f"peak_{name}_{unit}"] / limits).tolist()
         if self.max_speed is not None and not problem.froude:
             gait, limits = solution.gait.motor_gait, np.asarray(self.max_speed)
-            shortest = shortest_period(gait, limits, keep_pace=True)
-            facts |= {"max_speed_rad_per_s": limits.tolist(), "shortest_period_s": shortest}
+            shortest = facts["shortest_period_s"] = shortest_period(gait, limits, keep_pace=True)
             with suppress(*UNKNOWN):
                 paced = _MotionWithInertia(solution, self.froude * (self.period / shortest) ** 2)
                 speed = paced.distance * self.length / shortest
                 facts["speed_at_shortest_period_m_per_s"] = speed
             if not problem.paced_by:
                 facts["shortest_period_paced_by_speed_s"] = shortest_period(gait, limits)
-        if self.max_torque is not None:
-            facts["max_torque_N_m"] = np.asarray(self.max_torque).tolist()
-            facts["torque_used"] = (np.array(facts["peak_torque_N_m"]) / self.max_torque).tolist()
-            if moving is not None:
-                slowly = joint_torques(solution, np.arange(_INSTANTS) / _INSTANTS)
-                used = self.torque_unit * np.abs(slowly).max(axis=1) / self.max_torque
-                facts["torque_used_slowly"] = used.tolist()
+        if self.max_torque is not None and moving is not None:
+            slowly = joint_torques(solution, np.arange(_INSTANTS) / _INSTANTS)
+            used = self.torque_unit * np.abs(slowly).max(axis=1) / self.max_torque
+            facts["torque_used_slowly"] = used.tolist()
         return facts
 
     def __str__(self) -> str:
