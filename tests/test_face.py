@@ -84,7 +84,8 @@ def test_the_module_behind_python_m_is_also_the_function():
 
 
 def test_a_solution_becomes_a_figure_a_page_a_film_and_tables(three_link, tmp_path):
-    assert len(three_link.plot().axes) == 5
+    assert len(drawn := three_link.plot().axes) == 5
+    assert "against friction" in drawn[-1].get_title("left")
     assert three_link.plot()._repr_png_().startswith(b"\x89PNG")  # by which a notebook shows it
     page = three_link.report(tmp_path / "x.html").read_text(encoding="utf-8")
     assert page.startswith("<!DOCTYPE html>")

@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from colloc.dynamics.control_problem import control_problem
 from colloc.gaits.robot import Limit, under_one_limit
 from colloc.mechanics.bodies import Body
-from colloc.mechanics.contact import crossing_depth, link_width
+from colloc.mechanics.contact import link_width
 from colloc.mechanics.floor_contact import FOOT, WHEEL
 from colloc.pictures.style import (
     BLUE,
@@ -147,7 +147,7 @@ def plot_solution(solution: Solution, ax: Axes | None = None, panel: str = "gait
         ("in the lab (black: at the end)", draw_lab),
         ("shape space (disc: t = 0)" if _is_planar(solution) else "shape", draw_gait),
         ("sliding speeds (near δ: sticking)", _draw_speeds),
-        (f"power; W = {work:.4g}{' J' * bool(si)} (ticks: mesh)", _draw_power),
+        (f"W = {work:.4g}{' J' * bool(si)} against friction (ticks: mesh)", _draw_power),
     )
     with figure_style():
         figure = Picture(figsize=(11, 8.2), layout="none")  # type: ignore[arg-type]
@@ -345,11 +345,12 @@ def forbidden(
     stretched, limit = under_one_limit(shapes, joint_limit)
     bounded = body.bounded_angles
     if body.n_joint == 2:
-        excess = np.maximum(bounded.largest(stretched) - limit, crossing_depth(body, shapes))
+        crossing = (each.excess(shapes)[0] for each in body.contacts())
+        excess = np.max([bounded.largest(stretched) - limit, *crossing], axis=0)
     else:
         rows = bounded.rows[~np.delete(bounded.rows, [first, second], axis=1).any(axis=1)]
         excess = np.abs(rows @ stretched).max(axis=0, initial=0.0) - limit
-    return grid, np.maximum(excess, 0.0).reshape(a.shape)
+    return grid, excess.reshape(a.shape)
 
 
 def draw_shape_path(axes: Axes, solution: Solution, first: int = 0) -> None:
