@@ -42,6 +42,8 @@ def test_joint_speed_limits_hold_at_the_samples_and_between_them(limits, slower)
     wanted = slower * shortest_period(path_of(WAVE), allowed[:, 0])
     made = plan_trajectory(path_of(WAVE), 100.0, wanted, limits)
     assert wanted <= made.period < wanted + 0.01
+    rounded = plan_trajectory(path_of(WAVE), 100.0, made.period * (1 + 1e-8), limits)
+    assert rounded.time.size == made.time.size
     assert (np.abs(made.speeds) <= allowed * (1 + 1e-9)).all()
     steps = np.diff(np.concatenate([made.angles, made.angles[:, :1]], axis=1), axis=1) * 100.0
     assert (np.abs(steps) <= allowed * (1 + 1e-9)).all()
