@@ -58,16 +58,21 @@ _EXIT_CODES = """\
 Exit codes: 0 success; 1 different (--compare); 2 bad problem, option or file; 3 nothing found; 4 a
 certificate failed; 130 interrupted."""
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180}
-_UNITS = {
-    "length": {"m": 1.0, "cm": 0.01, "mm": 0.001},
-    "mass": {"kg": 1.0, "g": 0.001},
-    "period": {"s": 1.0, "ms": 0.001},
-    "max_speed": {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30},
-    "max_torque": {"Nm": 1.0, "mNm": 0.001},
-    "idle_power": {"W": 1.0, "mW": 0.001},
-    "backlash": _ANGLES,
-    "joint_limit": _ANGLES,
+_IN_UNITS: dict[str, tuple[dict[str, float], str, str]] = {
+    "length": ({"m": 1.0, "cm": 0.01, "mm": 0.001}, "M", "length of the stretched robot [m]"),
+    "mass": ({"kg": 1.0, "g": 0.001}, "KG", "mass of the robot [kg]"),
+    "period": ({"s": 1.0, "ms": 0.001}, "S", "seconds per cycle"),
+    "max_speed": (
+        {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": math.pi / 30},
+        "V",
+        "speed limit of the joints [rad/s]",
+    ),
+    "max_torque": ({"Nm": 1.0, "mNm": 0.001}, "M", "torque limit of the joints [N m]"),
+    "idle_power": ({"W": 1.0, "mW": 0.001}, "P", "power of the electronics [W]"),
+    "backlash": (_ANGLES, "ANGLE", "backlash of the joints [rad]"),
+    "joint_limit": (_ANGLES, "ANGLE", "largest angle of a joint [rad]"),
 }
+"""Options whose numbers may end in a unit: their units, what stands for the value, what it is."""
 _LONGEST_NAME = 220  # bytes; systems allow 255, and temporary files have longer names
 _MOST = 2**63 - 1
 Option = tuple[str, dict[str, Any]]
@@ -110,6 +115,8 @@ def _run(words: list[str]) -> int:
 
     hints = [f"solve {name}"] if name.endswith(".py") else []
     hints += difflib.get_close_matches(name, SUBCOMMANDS, n=1)
+    if name == "compare":
+        hints = ["verify --compare"]
     choose = f"choose one of {', '.join(SUBCOMMANDS)}."
     hint = f"do you mean colloc {hints[0]}?" if hints else choose
     raise ProblemError(f"there is no command {name!r}; {hint}")
@@ -194,18 +201,18 @@ def option(
     return name, {"help": help, "type": read, "default": default, **more}
 
 
-def in_units(name: str) -> Callable[[str], float]:
-    """Reader of a number that may end in a unit of what it is; without one it is in the first."""
-    units = _UNITS[name]
+def in_units(name: str, help: str = "", **more: Any) -> Option:
+    """The option of a positive number, which may end in a unit; else it is in the first."""
+    units, metavar, what = _IN_UNITS[name]
 
     def read(text):
         match = re.fullmatch(r"\s*([-+.\deE]*[\d.])\s*([A-Za-z/]*)\s*", text)
         if not match or match[2] not in {"", *units}:
-            what = f"must be a number, or one in {' or '.join(units)}, not {text!r}"
-            raise argparse.ArgumentTypeError(what)
+            why = f"must be a number, or one in {' or '.join(units)}, not {text!r}"
+            raise argparse.ArgumentTypeError(why)
         return float(match[1]) * units.get(match[2], 1.0)
 
-    return read
+    return option(read, f"--{name.replace('_', '-')} {metavar}", what + help, least=0, **more)
 
 
 def output(what: str) -> Option:
@@ -239,22 +246,12 @@ PROBLEM = (
     *CHANGES,
 )
 """The problem file, and the changes to it that every solving command takes."""
-LENGTH = option(
-    in_units("length"), "--length M", "of the stretched robot [m] (default: the problem's)", least=0
-)
-ROBOT = (
-    LENGTH,
-    option(in_units("mass"), "--mass KG", "of the robot [kg] (default: the problem's)", least=0),
-    option(float, "--gravity G", "default: the problem's, or 9.81 m/s^2"),
-)
-PERIOD = option(in_units("period"), "--period S", "seconds per cycle", least=0)
+LENGTH, _MASS = (in_units(name, " (default: the problem's)") for name in ("length", "mass"))
+ROBOT = LENGTH, _MASS, option(float, "--gravity G", "default: the problem's, or 9.81 m/s^2")
+PERIOD = in_units("period")
 MAX_SPEED, MAX_TORQUE = (
-    option(in_units(name), signature, f"limit of the joints [{unit}]: one for all or one each",
-           least=0, nargs="+")
-    for name, signature, unit in (
-        ("max_speed", "--max-speed V", "rad/s"), ("max_torque", "--max-torque M", "N m")
-    )
-)  # fmt: skip
+    in_units(name, ": one for all or one each", nargs="+") for name in ("max_speed", "max_torque")
+)
 
 
 def _attribute(option: Option) -> str:

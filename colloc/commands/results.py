@@ -200,9 +200,9 @@ def report(options: argparse.Namespace) -> int:
     cli.option(
         str, "--format", "default: by the suffix of --output, else gif", choices=("gif", "mp4")
     ),
-    cli.option(int, "--periods N", "cycles in a row (default: 2)", 2),
-    cli.option(float, "--seconds S", "seconds per cycle (default: those of the robot, or 4)"),
-    cli.option(float, "--fps N", "frames per second (default: 20)", 20.0),
+    cli.option(int, "--periods N", "cycles in a row (default: 2)", 2, least=1),
+    cli.option(float, "--seconds S", "seconds per cycle (default: the robot's, or 4)", least=0),
+    cli.option(float, "--fps N", "frames per second (default: 20)", 20.0, least=0),
     cli.option(int, "--width PIXELS", "default: 900", 900),
     cli.flag("--from-rest", "with inertia: the first cycles of a body that starts at rest"),
     cli.flag("--no-arrows", "do not draw friction"),

@@ -44,16 +44,7 @@ EXIT = {
     CERTIFICATE_FAILED: cli.FAILED,
     INTERRUPTED: cli.INTERRUPTED,
 }
-_SI = {
-    "length": ("M", "length of the stretched robot [m]"),
-    "mass": ("KG", "mass of the robot [kg]"),
-    "period": ("S", "seconds per cycle; or the shortest and the longest to search"),
-    "max_speed": ("V", "speed limit of the joints [rad/s]"),
-    "max_torque": ("M", "torque limit of the joints [N m]"),
-    "idle_power": ("P", "power of the electronics [W]"),
-    "backlash": ("ANGLE", "backlash of the joints [rad]"),
-}
-"""What a robot is stated by: what stands for its value, and what it is."""
+_OF_A_ROBOT = ["length", "mass", "period", "max_speed", "max_torque", "idle_power", "backlash"]
 
 
 @cli.command(
@@ -68,22 +59,10 @@ _SI = {
     cli.option(int, "--feet N", "feet on each link (default: none, links lie flat)"),
     cli.flag("--wheels", "a wheel in the middle of each link"),
     cli.option(float, "--mu MU", "coefficient of friction (default: the file's, or 1)", least=0),
-    cli.option(
-        cli.in_units("joint_limit"),
-        "--joint-limit ANGLE",
-        f"largest angle of a joint [rad] (default: {_LARGEST})",
-        least=0,
-    ),
-    *(
-        cli.option(
-            cli.in_units(name),
-            f"--{name.replace('_', '-')} {metavar}",
-            what,
-            least=0,
-            **({"nargs": "+"} if name == "period" else {}),
-        )
-        for name, (metavar, what) in _SI.items()
-    ),
+    cli.in_units("joint_limit", f" (default: {_LARGEST})"),
+    *map(cli.in_units, _OF_A_ROBOT[:2]),
+    cli.in_units("period", "; or the shortest and the longest to search", nargs="+"),
+    *map(cli.in_units, _OF_A_ROBOT[3:]),
 )
 def init(options: argparse.Namespace) -> int:
     path: Path = options.problem
@@ -181,14 +160,13 @@ def _known(model: Model | None) -> dict[str, Any]:
 
 def _stated_robot(options: argparse.Namespace, model: Model | None) -> dict[str, Any]:
     """Arguments of a `Robot`; none if no option speaks of it."""
-    robot = {name: x for name in _SI if (x := getattr(options, name)) is not None}
+    robot = {name: x for name in _OF_A_ROBOT if (x := getattr(options, name)) is not None}
     if not robot:
         return {}
     robot = _known(model) | robot
-    if missing := [f"--{name}" for name in [*_SI][:3] if name not in robot]:
+    if missing := [f"--{name}" for name in _OF_A_ROBOT[:3] if name not in robot]:
         raise ProblemError(
-            f"a robot in SI units needs --length, --mass and --period; {' and '.join(missing)} "
-            f"{'is' if len(missing) == 1 else 'are'} missing."
+            f"a robot in SI units needs --length, --mass, --period; missing: {', '.join(missing)}."
         )
     period = robot["period"]
     robot["period"] = period[0] if len(period) == 1 else tuple(period)

@@ -187,15 +187,16 @@ def pictures(
             value = f"{each.problem.objective.name} {each.measured.value:.4f}"
             value += "" if each.success else f"  ({each.status})"
             speed = f"{100 * facts[k]['speed_m_per_s']:.3g} cm/s" if real else ""
+            squares = "   (squares of 10 cm)" * real
             if alone:
-                value = f"{speed}   (squares of 10 cm)" if real else value
+                value = speed + squares if real else value
                 figure.text(left, 0.93, title + value, fontsize=11 * small, weight="bold")
                 continue
             way = f"{each.distance:.4f} body lengths per cycle"
             if real:
                 way = f"{speed}, {times[k]:.3g} s per cycle"
             upper, lower = 0.085 * width / height, 0.055 * width / height
-            figure.text(left, upper, title, fontsize=11 * small, weight="bold", va="top")
+            figure.text(left, upper, title + squares, fontsize=11 * small, weight="bold", va="top")
             figure.text(left, lower, f"{way}; {value}", fontsize=9 * small, va="top")
         right, unit = (share if alone else 0.99), " s" if real else ""
         top = 0.93 if alone else 1 - 0.028 * width / height

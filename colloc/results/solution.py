@@ -243,12 +243,13 @@ class Solution:
         """Number of starts, and other gaits that the search met."""
         if self.answer.program in (PRESCRIBED, EVALUATED):
             return ["none: the gait was given"]
+        what = "local optimum" if self.answer.optimal else "no optimum"
         if self.starts == 1 or not self.others:
-            return ["local optimum, from one start"]
+            return [f"{what}, from one start"]
         # others are as a coarse mesh sees them, and one that shrank may be better
         this = min(self.others, key=lambda other: abs(other.value - self.answer.value))
         others = "; ".join([str(other) for other in self.others if other is not this][:4])
-        first = f"local optimum, best of {self.starts} starts; {this.starts} converged to it"
+        first = f"{what}, best of {self.starts} starts; {this.starts} converged to it"
         return [first, f"also met, on a coarse mesh: {others}"] if others else [first]
 
     @property

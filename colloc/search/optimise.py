@@ -258,7 +258,7 @@ def refine(iterate: Iterate) -> Iterate:
             if more_panels is None and plan is None and iterate.kkt == FINE:
                 return iterate
             if count == OPTIONS.meshes:
-                text = f"mesh refinement stopped after {count} meshes without converging."
+                text = f"Mesh refinement stopped after {count} meshes without converging."
                 return replace(iterate, message=text)
             if more_panels is not None:
                 (space, v), kkt = more_panels, MEDIUM
@@ -273,7 +273,7 @@ def refine(iterate: Iterate) -> Iterate:
                 return iterate  # it would on the next mesh, too
         except NotConvergedError as error:
             # keep the unrefined gait; its certificate records the mesh error
-            return replace(iterate, message=f"refinement ended, as on a finer mesh: {error}")
+            return replace(iterate, message=f"Refinement ended, as on a finer mesh: {error}")
 
 
 def on_more_panels(iterate: Iterate) -> tuple[SearchSpace, np.ndarray] | None:

@@ -31,7 +31,7 @@ from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
 from colloc.search.optimise import descend, leave_saddle, refine
 from colloc.search.options import OPTIONS, TOLERANCES, settings
 from colloc.system.arguments import check_choice
-from colloc.system.errors import NotConvergedError
+from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.interruption import clear_interrupt
 
 REDUCED, FULL = "reduced", "full"
@@ -64,6 +64,10 @@ def solve(
     so far is returned.
     """
     check_choice(SEARCHES, search=search)
+    if search == FULL and (starts or 1) > 1:
+        raise ProblemError(
+            f"the full search is from the guess alone: starts must be 1, not {starts}."
+        )
     begin, run = time.monotonic(), Run(keep, problem, progress)
     try:
         with run.active(seconds):
@@ -76,8 +80,8 @@ def solve(
             least = {aim.name: least for aim, least in reachable.at_least}.get("distance")
             if asked is not None and least is not None and least < asked:
                 solution.message = (
-                    f"The farthest gait goes {2 * least:.3g} body lengths per cycle, less than the "
-                    f"{asked:g} required, so half of that was required: {least:.3g}. "
+                    f"The farthest gait known before goes {2 * least:.3g} body lengths per cycle, "
+                    f"and {asked:g} are required, so half of that was required: {least:.3g}. "
                     f"{solution.message}"
                 ).strip()
     except KeyboardInterrupt:
@@ -200,7 +204,8 @@ def certify_answer(problem: Problem, answer: Answer) -> Solution:
         solution.message = text  # why the search ended says more than what does not hold for that
         return solution
     if failed := solution.certificate.failures:
-        finer = "a smaller mesh_tolerance"
+        stopped = any(check.name == "mesh error" for check in failed)  # no mesh was fine enough
+        finer = f"{'more starts or a larger' if stopped else 'a smaller'} mesh_tolerance"
         advice = " and ".join(dict.fromkeys(_ADVICE.get(c.name, finer) for c in failed))
         text = f"the certificate failed: {solution.certificate.missed}. Try {advice}. {text}"
     elif is_free and on_speed_floor(problem, answer.gait):
@@ -252,9 +257,16 @@ def choose(problem: Problem, solutions: Sequence[Solution]) -> Solution:
     finite = [each for each in passing if problem.shrinking or is_visible(each.answer.gait)]
     solution = replace(max(finite or passing, key=value, default=solutions[0]))
     better = [each for each in solutions if value(each) > value(solution)]
-    failing = [each for each in better if not passes(each)]
+    now = solution.certificate
+    # what the replay did not measure, or found to be better by more than the errors
+    failing = [
+        each
+        for each in better
+        if not passes(each)
+        and not each.certificate.value - each.certificate.value_error <= now.value + now.value_error
+    ]
     if passes(solution) and failing:
-        text = f"A gait of {value(failing[0]):.4f} is not verified: {failing[0].message}"
+        text = f"A gait of {value(failing[0]):.6f} is not verified: {failing[0].message}"
         solution.message = f"{solution.message} {text}".strip()
     smaller = [each for each in better if passes(each) and not is_visible(each.answer.gait)]
     if finite and smaller and not problem.shrinking:

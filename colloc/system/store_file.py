@@ -59,6 +59,8 @@ def open_file(path: str | os.PathLike[str], kind: str, version: int) -> Iterator
             yield file
     except Exception as error:  # h5py raises many kinds for a damaged file
         why = error if isinstance(error, CollocError) else f"{type(error).__name__}: {error}."
+        if isinstance(error, OSError) and "file signature" in str(error):
+            why = "it is no HDF5 file."
         raise StoreError(f"{path} is not a readable {kind}: {why}") from None
 
 

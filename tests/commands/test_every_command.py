@@ -33,7 +33,7 @@ init a,b.py -> letters, digits
 init new.py --links 2 -> 3 to 12
 init new.py --feet 99 -> colloc: body.feet must be 0 (a line) to 20
 init | new.py --links 1 1e-9 1
-solve | folder.py | fails.py | empty.py | text.h5
+solve | folder.py | fails.py | empty.py | text.h5 | problem.py --delta nan | problem.py --starts 0 | problem.py --seconds 0 | problem.py --search no
 solve nope.py -> there is no problem file
 solve good.h5 -> is a results file (HDF5), not a problem file
 solve LONG -> there is no problem file
@@ -45,13 +45,13 @@ solve problem.py --mesh 1 -> mesh is too small
 solve problem.py --scheme euler -> unknown scheme
 solve problem.py --start nope.h5 -> there is no file
 solve four.py --start good.h5 -> the gait of good.h5 cannot be the guess: guess has 2 joints
-solve problem.py --start study.py -> not a readable colloc solution
+solve problem.py --start study.py -> not a readable colloc solution: it is no HDF5 file
+solve problem.py --search full --starts 5 -> the full search is from the guess alone: starts must be 1, not 5
 solve problem.py --output /proc/nowhere/x.h5 -> cannot
 solve problem.py --output out.txt -> out.txt should end in .h5
 solve problem.py --output LONG.h5 -> too long
 solve problem.py --output LONG -> File name too long
 solve problem.py --turbo -> unrecognized arguments: --turbo
-solve | problem.py --delta nan | problem.py --starts 0 | problem.py --seconds 0 | problem.py --search no
 multistart | nope.py | fails.py | problem.py --workers 0 | problem.py --sampler no
 multistart problem.py --starts 0 -> --starts must be at least 1
 multistart problem.py --time-limit 0 -> --time-limit must be positive, not 0
@@ -71,8 +71,8 @@ verify LONG -> File name too long
 verify | good.h5 --compare | good.h5 --compare nope.h5 | text.h5 --compare good.h5
 report | nope.h5 | text.h5 | good.h5 --problem nope.py | good.h5 --period 1
 report good.h5 --output x.htm -> x.htm should end in .html
-animate | nope.h5 | text.h5 | good.h5 --periods 0 | good.h5 --seconds nan | good.h5 --fps 0
-animate | good.h5 --fps 1e9 | good.h5 --width 5 | good.h5 --format avi
+animate | nope.h5 | text.h5 | good.h5 --periods 0 | good.h5 --seconds nan | good.h5 --fps 1e9 | good.h5 --width 5 | good.h5 --format avi
+animate good.h5 --fps 0 -> --fps must be positive, not 0.0
 animate good.h5 --from-rest -> has no inertia, and is under way at once
 animate | good.h5 nope.h5 | good.h5 text.h5 | good.h5 good.h5 good.h5
 animate good.h5 --output x.avi -> x.avi should end in .gif or .mp4
@@ -93,10 +93,8 @@ evaluate | problem.py | problem.py nope.csv | nope.py text.h5 | problem.py text.
 evaluate text.h5 problem.py -> text.h5 is no problem file in Python (.py); one comes first.
 evaluate problem.py good.h5 -> good.h5 is no text of numbers in UTF-8: a CSV file is read here
 identify | problem.py | problem.py nope.csv | nope.py text.h5 | problem.py text.h5 | problem.py text.h5 --length 0
-robot | nope.h5 --length 1 --mass 1 --period 1 | good.h5 | good.h5 --length 1 --mass 1
+robot | nope.h5 --length 1 --mass 1 --period 1 | good.h5 | good.h5 --length 1 --mass 1 | good.h5 --length 0 --mass 1 --period 1 | good.h5 --length 1 --mass nan --period 1 | good.h5 --length 1 --mass 1 --period -5 | good.h5 --length 1 --mass 1 --period 1 --max-torque 1 2 3
 robot good.h5 --max-speed -1 -> --max-speed must be positive, not -1.0
-robot | good.h5 --length 0 --mass 1 --period 1 | good.h5 --length 1 --mass nan --period 1
-robot | good.h5 --length 1 --mass 1 --period -5 | good.h5 --length 1 --mass 1 --period 1 --max-torque 1 2 3
 steer | nope.py | fails.py | empty.py | good.h5 | problem.py --turn 200 | problem.py --turn x | problem.py --output x.txt
 pareto | nope.py | fails.py | empty.py | good.h5 | problem.py --points 1 | problem.py --objectives speed no
 sensitivity | nope.h5 | text.h5 | problem.py | good.h5 --no-such
@@ -198,8 +196,8 @@ def test_options_of_a_solve_are_what_the_search_is_asked_for(tmp_path, monkeypat
     words = [
         f"--{x.replace('_', '-').replace('intervals', 'mesh')}={y}" for x, y in CHANGES.items()
     ]
-    how = {"starts": 5, "seconds": 7.0, "search": "full", "fresh": True}
-    words += ["--starts=5", "--seconds=7", "--search=full", "--fresh", f"--output={tmp_path}/"]
+    how = {"starts": 1, "seconds": 7.0, "search": "full", "fresh": True}
+    words += ["--starts=1", "--seconds=7", "--search=full", "--fresh", f"--output={tmp_path}/"]
     assert colloc(["solve", f"{tmp_path}/p.py", *words]) == 2
     assert asked == CHANGES | how
 
@@ -252,6 +250,7 @@ def test_the_entry_point_lists_commands_and_suggests_the_nearest(capsys):
     for word, hint in (
         ("repot", "colloc report?"),
         ("x.py", "colloc solve x.py?"),
+        ("compare", "colloc verify --compare?"),
         ("zzzz", "choose one of init,"),
     ):
         assert colloc([word]) == 2

@@ -356,7 +356,7 @@ def test_a_robot_in_si_units_is_stated_whatever_units_are_typed(tmp_path):
     ("words", "says"),
     [
         ("--length 62 --mass 1 --period 2", "write length=0.62"),
-        ("--length 0.62", "--mass and --period are missing"),
+        ("--length 0.62", "missing: --mass, --period"),
         ("--links 3.5", "whole number of links"),
         ("--joint-limit 85grad", "must be a number, or one in rad or deg, not '85grad'"),
         ("--joint-limit 85", "--joint-limit is at most pi [rad], not 85; write degrees as 85deg"),

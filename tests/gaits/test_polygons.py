@@ -210,7 +210,7 @@ def test_a_gait_whose_finer_mesh_has_no_balance_is_kept_and_says_so(monkeypatch)
     monkeypatch.setattr("colloc.search.optimise.optimise", fails)
     kept = refine(found)
     np.testing.assert_array_equal(kept.v, found.v)
-    assert kept.message == "refinement ended, as on a finer mesh: the balance did not converge."
+    assert kept.message == "Refinement ended, as on a finer mesh: the balance did not converge."
 
 
 def test_a_quadrilateral_at_the_fold_beats_every_symmetric_one_known():

@@ -18,14 +18,16 @@ import colloc
 from benchmarks.kills import command as solve_command
 from benchmarks.kills import contents
 from colloc import BSpline, Chain, Friction, Harmonic, ModalBody, Polygon, Problem, ellipse, load
+from colloc.commands.solve import summary_lines
 from colloc.gaits.problem_file import read_problem_file
 from colloc.gaits.starts import is_visible, on_speed_floor
+from colloc.results.checks import UNCERTIFIED
 from colloc.search import checkpoint as ahead
 from colloc.search.checkpoint import ROWS, STAGES, Ahead, Run, active_run
 from colloc.search.explore import explore, first_optimum, sketch
 from colloc.search.optimise import descend
 from colloc.search.options import SearchOptions
-from colloc.search.solve import choose, solve
+from colloc.search.solve import certify_answer, choose, solve
 from colloc.system.files import run_file
 from colloc.system.row_file import put_rows, read_rows
 from tests.shared.cases import slow_but
@@ -160,7 +162,11 @@ def test_the_best_gait_of_finite_size_is_the_answer_unless_one_that_shrank_may_b
         assert "A tiny gait is better still" in chosen.message
     assert choose(found.problem, [small]).answer is small.answer
     failed = replace(found, answer=replace(found.answer, value=9.0, optimal=False), message="why")
-    assert "A gait of 9.0000 is not verified: why" in choose(found.problem, [failed, found]).message
+    assert choose(found.problem, [failed, found]).message == found.message  # as good in the replay
+    failed = replace(failed, certificate=UNCERTIFIED)
+    assert "A gait of 9.000000 is not verified: why" in choose(QUICK, [failed, found]).message
+    strict = replace(found.answer, problem=QUICK.with_(mesh_tolerance=1e-9))
+    assert "Try more starts or a larger mesh" in certify_answer(strict.problem, strict).message
 
     def stopped(*at):
         active_run().solutions += [failed, found]
@@ -313,6 +319,7 @@ def test_an_interrupted_solve_ends_with_the_best_gait_told_of_or_with_the_guess(
         first.gait.angles(np.arange(9) / 9), QUICK.guess.angles(np.arange(9) / 9), atol=1e-12
     )
     assert best.value == seen[-1].value > 1.5 * first.value
+    assert f"{best.value:.6f} on its mesh, not verified" in "\n".join(summary_lines(best, None))
     assert best.message.startswith("interrupted; this is the best gait so far.")
     assert solve(QUICK, 1).status != "interrupted"  # it is over then
 
