@@ -220,6 +220,11 @@ def on_fine_mesh(problem: Problem, gait: AnyGait) -> Answer:
     return replace(answer, history=(answer.step,))
 
 
+def _start_phase(motors: Fourier) -> float:
+    """Phase of a series at which its answer begins (`Harmonic.parameters`)."""
+    return math.atan2(motors.sin[0, 0], motors.cos[0, 0]) / (2 * math.pi)
+
+
 def _errors_of_samples(
     answer: Answer, gait: Fourier, samples: Uncertainty
 ) -> tuple[tuple[float, ...], str]:
@@ -234,9 +239,7 @@ def _errors_of_samples(
     control, richer = control_problem(answer.problem), samples.richer
     n_rows = samples.directions.shape[2]
     highest = max(gait.n_harmonic, n_rows // 2, richer.n_harmonic if richer else 0)
-    # where the gait of the answer begins
-    later = math.atan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * math.pi)
-    phases, wide = answer.mesh.times + later, Harmonic(highest)
+    phases, wide = answer.mesh.times + _start_phase(gait), Harmonic(highest)
     functions = np.stack([wide.functions(phases, derivative) for derivative in range(3)])
     aims, delta = control.aims, answer.problem.delta
     shapes = _Series(functions, answer.problem.joint_map)
@@ -540,8 +543,9 @@ class _Fit:
         return changed
 
     def off(self, x: np.ndarray, motors: Fourier | None = None) -> np.ndarray:
-        problem, gait = with_motors(self.with_(x), motors or self.gait)
-        motion = on_mesh(problem, gait, self.mesh).sample(self.phases)
+        series = motors or self.gait
+        problem, gait = with_motors(self.with_(x), series)
+        motion = on_mesh(problem, gait, self.mesh).sample(self.phases - _start_phase(series))
         centre, outline = (
             x + 1j * y for x, y in (motion.centre, lab_outline(problem.body, motion))
         )

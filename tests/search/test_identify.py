@@ -29,7 +29,7 @@ def recorded(
     """Angles and places of a point, from a camera somewhere; noise lasts for so many samples."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(periods * per_period)) / per_period
-    motion = solution.sample(t)
+    motion = solution.sample(t + 0.325)  # a camera begins anywhere in a period
     angles = motion.angles + noise * rng.normal(size=motion.angles.shape)
     if head := point == "head_":
         ends = np.stack(solution.problem.body.outline(motion.angles))[:, -1]
