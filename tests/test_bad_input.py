@@ -386,7 +386,7 @@ evaluate(PROBLEM, "nowhere.csv") | Basis("nowhere.csv") -> cannot read nowhere.c
 evaluate(PROBLEM, {"a": 1}) -> gait must be a Fourier, numbers, text, a path or a function
 evaluate(Problem("up", gait=Harmonic(1), grade=0.1), GAIT) -> colloc\.slope_motion
 evaluate(Problem("x", gait=Harmonic(1), froude=Free(0.1, 1.0), objective="efficiency"), GAIT) | evaluate(Problem("x", gait=Harmonic(1), froude=0.1, objective="distance / period"), GAIT) -> evaluated at one pace
-identify(Problem("up", gait=Harmonic(1), grade=0.1), "none.csv") -> up is no gait on the level at one pace
+identify(Problem("up", gait=Harmonic(1), grade=0.1), "none.csv") -> up is no gait on the level
 steer(PROBLEM, []) | steer(PROBLEM, [4.0]) | steer(PROBLEM, [float("nan")]) -> half a turn|a sequence of numbers
 steer(Problem("x", gait=Harmonic(1), rotation=0.1), [0.2]) -> straight
 pareto_front(PROBLEM, "speed", "distance/length") -> two objectives

@@ -70,6 +70,12 @@ class FittedGait:
     went: float = 0.0  # distance of the centre per cycle, mean over the record [body lengths]
 
     @property
+    def seconds(self) -> float | None:
+        """A cycle of a record whose unit of time is known [s]."""
+        second = self.record.second if self.record else None
+        return self.period / second if second else None
+
+    @property
     def centre(self) -> int:
         """`colloc.gaits.record.Record.centre`."""
         return self.record.centre if self.record else 0

@@ -38,6 +38,9 @@ _WORDS = {
 }
 """Words in names of columns, as regular expressions; "other" are columns that are no angles."""
 HEADINGS = {"theta", "yaw", "heading"}  # of a link, without a number
+_SECOND = {"": 1, "m": 1e3, "milli": 1e3, "n": 1e9, "nano": 1e9} | dict.fromkeys(
+    ("u", "µ", "micro"), 1e6
+)
 _ROUNDED = 0.15  # share of unequal time steps from which equal steps were rounded
 _MOST = 5_000  # samples; of more, every second, third ... is taken
 _CENTRED = np.radians(20)
@@ -54,6 +57,7 @@ class Record(NamedTuple):
     centre: int  # right angle about which servos are centred [degrees]; 0 if about none
     path: np.ndarray | None  # centre of mass and tail that markers tell, x and y, (2, 2, n_time)
     others: list[tuple[Column, np.ndarray]]  # columns that are neither, and their numbers
+    second: float | None  # in the unit of time, if that is known
 
     def describe(self, used: Collection[Column] = ()) -> str:
         """What was read, and what was left out, unless it was of use elsewhere."""
@@ -150,6 +154,8 @@ def read_record(
     facts += [f"time {unit}{even}", *table.notes, *notes]
     stated = re.search(r"^#\s*period_s:\s*([\d.eE+-]+)\s*$", table.preamble, re.M)
     period = float(stated[1]) if stated and unit == "in s" else None
+    of_time = re.search(r"in (\w*?)(s|secs?|seconds?)$", unit)
+    second = _SECOND.get(of_time[1]) if of_time else None
     centres = 0.5 * (angles.max(axis=1) + angles.min(axis=1))
     right = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
     centred = n_joint > 1 and np.abs(centres - right).max() < _CENTRED
@@ -157,7 +163,7 @@ def read_record(
     left = (c for c in columns if c.name and c not in [*clock, *joints])
     others = [(c, table.values[rows, c.at]) for c in left]
     read = time - time[0], angles, bool(in_degrees.all()), period, "; ".join(facts), centre
-    return Record(*read, places, others)
+    return Record(*read, places, others, second)
 
 
 def _names(columns: list[Column], which: np.ndarray) -> str:

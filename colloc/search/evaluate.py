@@ -128,10 +128,11 @@ def evaluate(
                 f"{gait}: all joints move about {fitted.centre}°, where links cross: if servos "
                 f"stand so when the body is straight, subtract it from every column of angles."
             )
+    problem, at_pace = _at_pace_of(problem, fitted)
     if problem.regime.free is not None:
         raise ProblemError(
-            "a gait is evaluated at one pace, by an objective without the period: "
-            "state froude=0.05 (a robot: one cycle), and such an objective."
+            "a gait is evaluated at one pace, by an objective without the period: state "
+            "froude=0.05 (a robot: one period, or a record's times in s), and such an objective."
         )
     stated, driven = with_motors(problem, series)
     if driven.shape_speed < (least := problem.smallest_shape_speed):
@@ -165,7 +166,7 @@ def evaluate(
             what = f"{name} uncertain by {errors[0]:.1e} (two standard deviations{missed})"
             said = f" This residual leaves {what}.{said}"
         certificate = certificate.with_samples(errors)
-    message = f"{fitted.describe()}.{said}"
+    message = f"{fitted.describe()}{at_pace}.{said}"
     solution = Solution(stated, answer, certificate, message=message, settings=settings())
     if fitted.path is not None and fitted.went and certificate.replayed:
         solution.message += (
@@ -175,6 +176,14 @@ def evaluate(
         )
     solution.seconds = time.monotonic() - begin
     return solution
+
+
+def _at_pace_of(problem: Problem, fitted: FittedGait) -> tuple[Problem, str]:
+    """A robot's problem at the pace of a record in seconds, and words for it."""
+    robot, seconds = problem.robot, fitted.seconds
+    if not robot or not seconds or np.isclose(robot.period, seconds, rtol=1e-3).all():
+        return problem, ""
+    return problem.with_(robot=replace(robot, period=seconds)), f"; at its {seconds:.4g} s a cycle"
 
 
 def with_motors(problem: Problem, motors: Fourier) -> tuple[Problem, AnyGait]:
@@ -405,15 +414,19 @@ def identify(
     >>> colloc.identify(floor, record).problem.friction
     Friction(mu_t=1.7, mu_f=1.0, mu_b=1.3)
     """
-    if problem.regime.slides or schedule(problem.body) or problem.regime.free is not None:
+    if problem.regime.slides or schedule(problem.body):
         raise ProblemError(
-            f"{problem.name} is no gait on the level at one pace: state a problem of such gaits."
+            f"{problem.name} is no gait on the level: state a problem of such gaits."
         )
-    length = length or getattr(problem.robot, "length", None)
+    if length is None:
+        length = getattr(problem.robot, "length", None)
     if length is not None:
         check_finite(positive=True, length=length)
     fitted = _fit_gait(problem, path := Path(record), period, harmonics, degrees)
     read: Any = fitted.record
+    problem, at_pace = _at_pace_of(problem, fitted)
+    if problem.regime.free is not None:
+        raise ProblemError("coefficients are identified at one pace: state one period or froude.")
     measured, used = _measured(path, read, length)
     fit = _Fit(problem.without_robot, measured, fitted.gait, read.time / fitted.period)
     if mu_forward is not None:
@@ -455,7 +468,10 @@ def identify(
         )
     points = [name for name, k in _POINTS.items() if fit.seen[0, k].any() and name != "center"]
     unit = f"lengths of {length:g} m" if length else "lengths"
-    message = f"{fitted.describe(used)}; path of {', '.join(points) or 'headings'} in body {unit}"
+    message = (
+        f"{fitted.describe(used)}{at_pace}; path of {', '.join(points) or 'headings'} in body "
+    )
+    message += unit
     both = zip(values.tolist(), errors.tolist(), strict=True)
     coefficients = dict(zip(fit.names, both, strict=True))
     return Identified(fit.with_(x, 5), coefficients, before, after, tuple(remarks), message)

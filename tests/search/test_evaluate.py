@@ -272,6 +272,15 @@ def test_errors_of_samples_are_in_units_of_friction_and_kept_and_no_disagreement
     np.testing.assert_allclose(driven, loaded.certificate.of_samples, rtol=0.1)
 
 
+def test_a_robot_is_played_at_the_pace_of_a_record_whose_unit_of_time_is_known(tmp_path):
+    robot = colloc.Robot(length=0.6, mass=1, period=(1, 5))
+    stated, angles = colloc.Problem("r", robot=robot), GAIT.angles(T)
+    for name, unit in (("t_ms", 1e-3), ("t [s]", 1.0)):
+        path = written(tmp_path / "x.csv", 2 / unit * T, angles, f"{name},q1,q2")
+        assert "; at its 2 s a cycle." in (played := colloc.evaluate(stated, path)).message
+        assert played.problem.robot.period == pytest.approx(2, 1e-3)
+
+
 def test_an_exported_gait_states_no_error_of_its_samples_whatever_its_columns(exact, tmp_path):
     for periods in (1, 3):
         exact.export(tmp_path / "x.csv", period=4, length=1, mass=2, periods=periods)
