@@ -35,7 +35,7 @@ from colloc.results.answer import SecondOrder
 from colloc.results.archive import StartName
 from colloc.search.certify import certify
 from colloc.studies.families import Gap, ParetoFront, Steering, read_front
-from tests.recorded.states import LOOP, MADE, STATED, state
+from tests.recorded.states import MADE, STATED, state
 from tests.shared.store_samples import archive, outcome
 
 TEXTS = Path(__file__).with_name("texts")
@@ -280,8 +280,8 @@ def folder(tmp_path_factory):
     for name, text in READ.items():
         (made / name).write_text(text, encoding="utf-8")
     time = np.arange(41) / 10
-    path = state("loop").sample(time / 4).centre
-    angles = [*np.degrees(LOOP.angles(time / 4)), *np.multiply([[2e3], [2e2]], path)]
+    motion = state("loop").sample(time / 4)
+    angles = [*np.degrees(motion.angles), *np.multiply([[2e3], [2e2]], motion.centre)]
     digits = "%.2f,%.4f,%.4f,%.6f,%.6f"
     np.savetxt(made / "crawls.csv", np.transpose([time, *angles]), digits, header=NAMES)
     found = archive(made / "starts.h5")

@@ -123,7 +123,7 @@ def test_directions_of_head_and_tail_alone_tell_coefficients_too(crawled, tmp_pa
     for point in ("tail_", "head_"):
         recorded(path, crawled, noise=1e-6, point=point)
         columns.append(np.loadtxt(path, delimiter=",", skiprows=1)[:, [0, 1, 2, -1]])
-    head = "time_s,joint_1,joint_2,yaw_deg,head_theta_deg"
+    head = "time,joint_1,joint_2,yaw_deg,head_theta_deg"  # in no unit: the robot's pace
     both = np.column_stack([columns[0], columns[1][:, -1]])
     np.savetxt(path, both, "%.9g", ",", header=head, comments="")
     stated = FLOOR.with_(robot=Robot(length=0.6, mass=1, period=900))
