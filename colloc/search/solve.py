@@ -207,7 +207,9 @@ def certify_answer(problem: Problem, answer: Answer) -> Solution:
         stopped = any(check.name == "mesh error" for check in failed)  # no mesh was fine enough
         finer = f"{'more starts or a larger' if stopped else 'a smaller'} mesh_tolerance"
         advice = " and ".join(dict.fromkeys(_ADVICE.get(c.name, finer) for c in failed))
-        text = f"the certificate failed: {solution.certificate.missed}. Try {advice}. {text}"
+        text = (
+            f"the certificate failed: {solution.certificate.missed}. Try {advice}. {text}".strip()
+        )
     elif is_free and on_speed_floor(problem, answer.gait):
         better = "more efficient" if problem.objective == EFFICIENCY else "better"
         text = (
