@@ -19,8 +19,9 @@ from scipy.spatial.transform import Rotation
 
 from colloc.system.errors import ProblemError
 
-_SMALL = 1e-3  # sine of an angle, or part of the length, that counts as none
+_SMALL = 1e-3  # sine of an angle, or part of a length or mass, that counts as none
 _OFF = 0.05  # distance of a link's mass from its middle that is spoken of, over its length
+_COVERED = 0.9  # part of a link from which on its solids count as the whole
 _ROLLS = 0.5  # friction along over that across, below which a contact is a wheel
 _LINE = 16  # Gauss points of a pad in MJCF
 _RARE = "include replicate attach frame *[@xyaxes] *[@zaxis] *[@axisangle]"
@@ -28,6 +29,7 @@ _UNREAD = {
     "moments of inertia (links count as uniform rods)": "inertia *[@diaginertia] *[@fullinertia]",
     "friction and damping of joints": "dynamics *[@damping] *[@frictionloss]",
     "couplings of joints": "mimic equality",
+    "limits of actuators (--max-torque)": "*[@forcerange] *[@actuatorfrcrange]",
     "friction of Gazebo": "mu1 mu2",
 }
 """What is said not to be taken, and the elements that have it."""
@@ -74,6 +76,10 @@ class _Part:
     moment: Any = 0.0  # sum of mass times place
     solids: list[tuple[np.ndarray, np.ndarray, int]] = field(default_factory=list)
     """Middle, half axes as columns, and the norm that tells how far they reach: 1 of a box."""
+
+    def reach(self, way: np.ndarray) -> list[float]:
+        """How far each solid reaches in a direction."""
+        return [float(x @ way + np.linalg.norm(way @ axes, n)) for x, axes, n in self.solids]
 
 
 def read_model(path: Path) -> Model:
@@ -309,8 +315,7 @@ def _chain(parts: list[_Part]) -> Model:
     for k, side in ((0, -1), (-1, 1)):
         part = links[k]
         tips = [side * float(x.place @ ahead) for x in stand if x.parent is part]
-        for middle, axes, norm in part.solids:
-            tips.append(float(side * middle @ ahead + np.linalg.norm(ahead @ axes, norm)))
+        tips += part.reach(side * ahead)
         if not part.solids and part.mass:
             tips = [side * (2 * float(part.moment @ ahead) / part.mass - at[k])]
             notes.append(f"{part.name} is taken to be twice as long as its mass is from its joint")
@@ -321,7 +326,9 @@ def _chain(parts: list[_Part]) -> Model:
             )
         at = np.insert(at, 0 if k == 0 else at.size, side * max(tips))
     lengths, wheels = np.diff(at), [x for x in stand if x.kind == "hinge"]
-    masses = [math.fsum(x.mass for x in (y, *wheels) if y in (x, x.parent)) for y in links]
+    # feet of next to no mass are points of contact
+    borne = [[x.mass for x in stand if x.parent is y and x.mass > _SMALL * y.mass] for y in links]
+    masses = [math.fsum([y.mass, *more]) for y, more in zip(links, borne, strict=True)]
     if min(masses) <= 0:
         masses = []
         notes.append("a link has no mass there, so all have weights in proportion to their lengths")
@@ -362,7 +369,10 @@ def _chain(parts: list[_Part]) -> Model:
                 rows = []
                 feet.append(f"Pad({k}, {middle - half:.4f}, {middle + half:.4f})")
         elif not rows:
-            feet.append(f"Pad({k}, {0:.4f}, {1:.4f})")
+            reached = (max(part.reach(way), default=math.inf) for way in (-ahead, ahead))
+            ends = ((np.array([*reached]) * (-1, 1) - at[k]) / lengths[k]).clip(0.0, 1.0)
+            low, high = ends if 0 < np.ptp(ends) < _COVERED else (0.0, 1.0)
+            feet.append(f"Pad({k}, {low:.4f}, {high:.4f})")
         feet += [f"{kind}({k}, {place:g}{more})" for place, kind, more in rows]
     if all(foot.endswith(", 0.0000, 1.0000)") for foot in feet):
         feet = []

@@ -203,6 +203,15 @@ def test_an_mjcf_has_classes_degrees_and_capsules(tmp_path, capsys):
     assert "rot2 = joint_1, rot3 = joint_2" in capsys.readouterr().out
     usual = SWIMMER.replace('<compiler angle="degree"/>', "")
     assert read(tmp_path, usual, kind="xml").hash == problem.hash
+    foot = '<joint type="slide" axis="0 0 1" stiffness="9"/><geom type="sphere"/></body><body '
+    stands = SWIMMER.replace('<body name="back"', f'<body pos="0.1 0 0">{foot}name="back"')
+    stands = stands.replace("0.19 0 0 0.01", "0.19 0 0 0.09")  # from 0.08 to 0.2
+    body = read(
+        tmp_path, stands.replace('"rot2"', '"rot2" actuatorfrcrange="0 1"'), kind="xml"
+    ).body
+    assert body.weights == pytest.approx([0.25, 0.5, 0.25])
+    assert [(x.kind, x.extent) for x in body.feet[::2]] == [("pad", 0.6), ("pad", 1.0)]
+    assert "not used: limits of actuators (--max-torque)" in capsys.readouterr().out
 
 
 def test_an_mjcf_counts_angles_from_its_reference_and_the_stated_mass_of_a_body_alone(
@@ -220,10 +229,8 @@ def test_an_mjcf_counts_angles_from_its_reference_and_the_stated_mass_of_a_body_
     assert read(tmp_path, flat, kind="xml").body.lengths == pytest.approx(lengths / lengths.sum())
     off = heavy.replace('pos="0.1', 'pos="0.12')
     light = SWIMMER.replace('<geom fromto="0.01', '<geom mass="0" fromto="0.01')
-    for model, note in (
-        (off, "the mass of mid is taken to be in its m"),
-        (light, "a link has no m"),
-    ):
+    said = "the mass of mid is taken to be in its m", "a link has no m"
+    for model, note in zip((off, light), said, strict=True):
         assert note not in capsys.readouterr().out
         assert (read(tmp_path, model, kind="xml").body.weights == ()) == (model is light)
         assert note in capsys.readouterr().out
