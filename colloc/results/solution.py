@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,6 +39,7 @@ from colloc.results.motion import (
 from colloc.system.arguments import checked_arguments
 from colloc.system.environment import higher, versions
 from colloc.system.errors import ProblemError
+from colloc.verification.adaptive_motion import Replay
 from colloc.verification.dry_friction import DryFriction, dry_friction
 from colloc.verification.replay import replayer
 
@@ -180,15 +182,28 @@ class Solution:
         at = self.problem.body, self.problem.law, self.gait, self.delta_per_period
         return play(*at, *more, breaks=self.gait.corner_phases, **how)
 
+    @cached_property
+    def quasi_static(self) -> Replay:
+        """The same gait without inertia; its distance is the chord of the arc on which it goes
+        then, whatever phase it begins at. `NotConvergedError` if a slope does not hold it."""
+        p = self.problem
+        play = replayer(p.regime.slowly)
+        how: Any = {"quantities": p.objective.integrals}
+        turn = self.played_by(play, turn=p.rotation or 0.0, **how).rotation
+        return self.played_by(play, turn=turn, **how)
+
     @property
     def played_slowly(self) -> float:
-        """The objective of the same gait played so slowly that inertia does not matter;
-        `NotConvergedError` if a slope does not hold it then."""
-        p = self.problem
-        how: Any = {"quantities": p.objective.integrals, "turn": p.rotation or 0.0}
-        replay = self.played_by(replayer(p.regime.slowly), **how)
+        """The objective of the same gait without inertia, at this period."""
         period = {"period": self.froude**-0.5} if self.froude else {}
-        return float(p.objective({**replay.values, **period}))
+        return float(self.problem.objective({**self.quasi_static.values, **period}))
+
+    @property
+    def slow_motion(self) -> str:
+        """What changes where inertia is left out, in words."""
+        turn = math.degrees(self.quasi_static.rotation)
+        turns = abs(turn - math.degrees(self.rotation)) > 0.1
+        return "without inertia at this period" + f", turning by {turn:.3g}° per cycle" * turns
 
     @property
     def cycles_from_rest(self) -> tuple[int, float]:
