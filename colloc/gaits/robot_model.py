@@ -327,7 +327,7 @@ def _chain(parts: list[_Part]) -> Model:
         at = np.insert(at, 0 if k == 0 else at.size, side * max(tips))
     lengths, wheels = np.diff(at), [x for x in stand if x.kind == "hinge"]
     # feet of next to no mass are points of contact
-    borne = [[x.mass for x in stand if x.parent is y and x.mass > _SMALL * y.mass] for y in links]
+    borne = [[x.mass for x in stand if x.mass > _SMALL * y.mass and x.parent is y] for y in links]
     masses = [math.fsum([y.mass, *more]) for y, more in zip(links, borne, strict=True)]
     if min(masses) <= 0:
         masses = []
