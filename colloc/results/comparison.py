@@ -18,6 +18,7 @@ its own image, and the image turns the other way.
 """
 
 import json
+from contextlib import suppress
 from itertools import product
 
 import numpy as np
@@ -31,6 +32,7 @@ from colloc.mechanics.law import Law
 from colloc.results.motion import PHASES
 from colloc.results.robot import in_si
 from colloc.results.solution import Solution
+from colloc.system.errors import ProblemError
 
 Rows = list[tuple[str, str, str]]
 
@@ -38,8 +40,15 @@ Rows = list[tuple[str, str, str]]
 def compare(a: Solution, b: Solution) -> tuple[Rows, Rows]:
     """Numbers of two results, and fields in which their problems differ: name and both values."""
     fields = _rows(_fields(a), _fields(b))
-    changes = [(name, f"{x:.44}", f"{y:.44}") for name, x, y in fields if x != y]
+    changes = [(name, _around(x, y), _around(y, x)) for name, x, y in fields if x != y]
     return _rows(_numbers(a), _numbers(b)), changes
+
+
+def _around(text: str, other: str) -> str:
+    """The part of a text, of 44 characters at most, where it differs from another."""
+    pairs = enumerate(zip(f"{text} ", f"{other} ", strict=False))
+    first = next(k for k, (x, y) in pairs if x != y)
+    return text[:44] if first < 40 else f"...{text[first - 20 : first + 21]}"
 
 
 def _rows(one: dict[str, str], two: dict[str, str]) -> Rows:
@@ -47,11 +56,16 @@ def _rows(one: dict[str, str], two: dict[str, str]) -> Rows:
 
 
 def _fields(solution: Solution) -> dict[str, str]:
-    texts: dict[str, str] = {}
-    for name, value in solution.problem.to_dict().items():
+    texts, problem = dict[str, str](), solution.problem
+    for name, value in problem.to_dict().items():
         parts = value if isinstance(value, dict) and name != "guess" else {"": value}
-        texts |= {f"{name} {part}".strip(): json.dumps(x) for part, x in parts.items()}
-    return texts | {"guess": f"moves by {_degrees(solution.problem.guess)} deg"}
+        stated = {f"{name} {part}".strip(): x for part, x in parts.items() if x is not None}
+        texts |= {part: json.dumps(x) for part, x in stated.items()}
+    guess = texts.pop("guess")
+    with suppress(ProblemError):  # none
+        if guess == json.dumps(problem.with_(guess=None).to_dict()["guess"]):
+            return texts
+    return texts | {"guess": f"moves by {_degrees(problem.guess)} deg"}
 
 
 def _degrees(gait: AnyGait) -> str:
@@ -98,7 +112,10 @@ def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
     """True if two results are the same optimum, and a sentence."""
     what, other = a.problem.objective, b.problem.objective
     if other != what:
-        return False, f"other objectives: {what.name} and {other.name}."
+        names = f"{what.name} and {other.name}"
+        if what.name == other.name:
+            names = f"{what.name}, of terms with other weights (idle power: by the robot)"
+        return False, f"other objectives: {names}."
     values = [each.measured.value for each in (a, b)]
     difference = abs(values[0] - values[1]) / max(*map(abs, values), 1e-300)
     values_of = "efficiencies" if what == EFFICIENCY else f"values of {what.name}"

@@ -17,7 +17,7 @@ from colloc.commands import results as recheck
 from colloc.commands.solve import summary_dict, summary_lines
 from colloc.results import checks
 from colloc.results.checks import UNCERTIFIED
-from colloc.results.comparison import gait_distance
+from colloc.results.comparison import compare, gait_distance
 from colloc.results.robot import joint_torques, limit_lines
 from tests.shared.cases import slow_but
 
@@ -141,6 +141,10 @@ def test_the_same_gait_found_for_another_objective_is_not_the_same_optimum(three
     assert gait_distance(three_link, other) is None  # of another body
     fast = replace(three_link, problem=three_link.problem.with_(objective="speed"))
     assert recheck.verdict(three_link, fast) == (False, "other objectives: efficiency and speed.")
+    bodies = (Chain(feet=[*map(colloc.Foot, (0, 1)), colloc.Foot(2, x)]) for x in (0.5, 0.6))
+    stated = (Problem("p", body=x, gait=colloc.Harmonic(1, "none")) for x in bodies)
+    both = [replace(three_link, problem=problem) for problem in stated]
+    assert [x[0] for x in compare(*both)[1] if x[1][:30] != x[2][:30]] == ["body feet"]
 
 
 def test_compare_tells_the_same_optimum_from_another(three_link, solved, tmp_path, capsys):
