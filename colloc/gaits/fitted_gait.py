@@ -305,12 +305,17 @@ class _Samples(NamedTuple):
         gait = Fourier.from_table(table[:, int(fit.drifts) :])
         drift = np.abs(table[:, 0]) * fit.drifts  # per cycle
         ranges = np.ptp(gait.angles(_PHASES), axis=1)
-        if drift.max() > _DRIFT * ranges.max():
+        gap, what = np.diff(self.time).max(), ""
+        if ranges.max() > 3 * np.ptp(self.angles, axis=1).max():
+            what = f"has no samples for {gap:.4g} of a period of {fit.period:.4g}"
+        elif drift.max() > _DRIFT * ranges.max():
             joint = int(drift.argmax())
             off, moves = (_format(each[joint], self.degrees) for each in (drift, ranges))
+            what = f"does not close: after a cycle joint {joint + 1} is off by {off}, and it moves "
+            what += f"through {moves}"
+        if what:
             raise ProblemError(
-                f"{self.name} does not close: after a cycle joint {joint + 1} is off by {off}, "
-                f"and it moves through {moves}. Give one whole period, or say how long it is "
+                f"{self.name} {what}. Give one whole period, or say how long it is "
                 f"(period=, --period)."
             )
         off = gait.angles(self.time / fit.period) - self.angles

@@ -31,10 +31,10 @@ _WORDS = {
     "angle": "positions?|pos|angles?",
     "commanded": "cmd|command(ed)?|target|goal|setpoint|des(ired)?|ref(erence)?|sp",
     "link": "links?|segments?|heading|abs(olute)?|orientation",
-    "end": "head|tail|front|rear|back",
+    "end": "head|tail|front|rear|back|one|two|second|ii|beta|anterior",
     "unit of time": "m?s|[uµn]s|secs?|seconds?|[mu]sec|nsecs?|nanosecs?|(milli|micro|nano)seconds|"
     "millis|micros|min",
-    "unit not read": "revs?|revolutions|turns?|gons?|ticks?|counts",
+    "unit not read": "revs?|revolutions|turns?|gons?|ticks?|counts|pi|norm.*|[cmuµ]deg|[uµ]rad|%",
 }
 """Words in names of columns, as regular expressions; "other" are columns that are no angles."""
 HEADINGS = {"theta", "yaw", "heading"}  # of a link, without a number
@@ -69,29 +69,32 @@ class Record(NamedTuple):
 class Column(NamedTuple):
     at: int
     name: str
-    words: tuple[str, ...] = ()  # letters and numbers of name and unit, in lower case
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Letters and numbers of name and unit, in lower case."""
+        spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", self.name).lower()
+        return tuple(re.findall(r"[^\W\d_]+|\d+|[°%]", spaced))
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        return tuple(int(word) for word in self.words if word.isdecimal())
+        return tuple(int(w) for w in self.words if w.isdecimal())
 
     @property
     def skeleton(self) -> tuple[str, ...]:
         """The pattern of the names of one set of columns."""
-        words = (word for word in self.words if word not in _ANGLES)
-        return tuple("#" if word.isdecimal() else word for word in words)
+        return tuple("#" if w.isdecimal() else w for w in self.words if w not in _ANGLES)
 
     def last(self, what: str) -> str:
         """The last of its words that speaks of something; else empty."""
-        return next((word for word in reversed(self.words) if re.fullmatch(_WORDS[what], word)), "")
+        return next((w for w in reversed(self.words) if re.fullmatch(_WORDS[what], w)), "")
 
     @property
     def kind(self) -> str:
         """One of "time", "count", "other", "place" and, if nothing else, "angle"."""
         words, unit = self.words, self.words[-2:]
-        if self.last("time") or (
-            words and all(re.fullmatch(_WORDS["unit of time"], w) for w in words)
-        ):
+        units = [w for w in words if re.fullmatch(_WORDS["unit of time"], w)]
+        if self.last("time") or 0 < len(units) == len(words):
             return "time"
         # a number and a unit, as 1 v; a velocity; newton metres
         other = words[:1] == ("v",) or unit == ("n", "m")
@@ -133,7 +136,7 @@ def read_record(
     if (every := -(-rows.size // _MOST)) > 1:
         time, rows = time[::every], rows[::every]
         notes.append(f"of {len(table.lines)} rows, one in {every} taken")
-    raw, places = table.values[rows][:, [column.at for column in joints]].T, None
+    raw, places = table.values[rows][:, [c.at for c in joints]].T, None
     if body is not None and joints[0].kind == "place":
         units = np.ones(n_joint)
         raw, places, length = _from_markers(path, raw.reshape(-1, 2, rows.size), body)
@@ -160,7 +163,7 @@ def read_record(
     right = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
     centred = n_joint > 1 and np.abs(centres - right).max() < _CENTRED
     centre = int(np.degrees(right).round()) if centred else 0
-    left = (c for c in columns if c.name and c not in [*clock, *joints])
+    left = (c for c in columns if c.name and c not in clock + joints)
     others = [(c, table.values[rows, c.at]) for c in left]
     read = time - time[0], angles, bool(in_degrees.all()), period, "; ".join(facts), centre
     return Record(*read, places, others, second)
@@ -185,32 +188,29 @@ def _columns(
             _refuse_count(path, width - 1, n_joint)
         clock, joints = unnamed[: width - n_joint], unnamed[width - n_joint :]
         return [], clock, joints, "in the file's order, as it has no names"
-    columns = []
-    for j, each in enumerate(zip(table.names, table.units, strict=True)):
-        name = " ".join(each)
-        spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
-        columns.append(Column(j, name.strip(), tuple(re.findall(r"[^\W\d_]+|\d+|°", spaced))))
-    varies = [column for column in columns if len({row[column.at] for row in table.cells}) > 1]
-    times = [column for column in varies if column.kind == "time"]
-    whole, part = (
-        next((column for column in times if units & {*column.words}), None)
-        for units in ({"sec", "secs"}, {"nanosec", "nanosecs", "nsec", "nsecs"})
-    )
-    rising = [column for column in varies if (np.diff(table.values[:, column.at]) > 0).all()]
-    counts = [column for column in rising if column.kind == "count"]
+    both = zip(table.names, table.units, strict=True)
+    columns = [Column(j, " ".join(each).strip()) for j, each in enumerate(both)]
+    varies = [c for c in columns if len({row[c.at] for row in table.cells}) > 1]
+    times = [c for c in varies if c.kind == "time"]
+    times.sort(key=lambda c: "date" in c.words)
+    whole = [c for c in times if {"sec", "secs"} & {*c.words}][:1]
+    part = [c for c in times if {"nanosec", "nanosecs", "nsec", "nsecs"} & {*c.words}][:1]
+    rising = [c for c in varies if (np.diff(table.values[:, c.at]) > 0).all()]
+    counts = [c for c in rising if c.kind == "count"]
     # times in another language
-    others = [column for column in rising if column.at == 0 and not column.numbers]
-    clock = [whole, part] if whole and part else (times or counts or others)[:1]
+    others = [c for c in rising if c.at == 0 and not c.numbers]
+    clock = whole + part if whole and part else (times or counts or others)[:1]
     numeric = np.isfinite(table.values).any(axis=0)
-    may_be = [column for column in columns if column not in clock and numeric[column.at]]
+    left = [c for c in columns if c not in clock]
+    may_be = [c for c in left if numeric[c.at]] or left
     return columns, clock, *_joints(path, may_be, n_joint, body)
 
 
 def _joints(
     path: Path, columns: list[Column], n_joint: int, body: Chain | None
 ) -> tuple[list[Column], str]:
-    angles = [column for column in columns if column.kind == "angle"]
-    places = [column for column in columns if column.kind == "place"]
+    angles = [c for c in columns if c.kind == "angle"]
+    places = [c for c in columns if c.kind == "place"]
     if not angles and places and body is not None:
         return _markers(path, places, n_joint + 2), "from positions of points"
     if not angles and places:
@@ -219,23 +219,23 @@ def _joints(
             f"its columns {_ends(places)} look like positions of points of the body; write joint "
             f"angles, each the direction of a link less that of the link behind it",
         )
-    measured = [column for column in angles if not column.last("commanded")]
+    measured = [c for c in angles if not c.last("commanded")]
     if len(angles) > n_joint <= len(measured):
         angles = measured
-    joints = [column for column in angles if not {*column.words} & HEADINGS or column.numbers]
+    joints = [c for c in angles if not {*c.words} & HEADINGS or c.numbers]
     if len(angles) > n_joint <= len(joints):
         angles = joints
     sets: dict[tuple[str, ...], list[Column]] = {}
     for column in angles:
         sets.setdefault(column.skeleton, []).append(column)
-    same = len({column.skeleton[:-1] for column in angles}) == 1
-    if same and all(len(column.skeleton[-1]) == 1 for column in angles):
+    same = len({c.skeleton[:-1] for c in angles}) == 1
+    if same and all(len(c.skeleton[-1]) == 1 for c in angles):
         sets = {(): angles}  # known by a letter
     numbered = []
     for key, each in sets.items():
         if "#" in key or (not key and n_joint > 1):
-            numbered.append(sorted(each, key=lambda column: (column.numbers, column.words)))
-            if len({column.words for column in each}) < len(each):
+            numbered.append(sorted(each, key=lambda c: (c.numbers, c.words)))
+            if len({c.words for c in each}) < len(each):
                 _refuse(path, f"two columns are called {each[0].name}")
     full = [each for each in numbered if len(each) == n_joint]
     if len(full) > 1:
@@ -254,25 +254,24 @@ def _joints(
         )
     if len(angles) != n_joint:
         _refuse_count(path, len(angles), n_joint)
-    in_order = all(each == [column for column in angles if column in each] for each in numbered)
-    if not in_order or any(column.last("end") for column in angles):
+    in_order = all(each == [c for c in angles if c in each] for each in numbered)
+    if not in_order or any(c.last("end") for c in angles):
         _refuse(path, f"the order of the columns {', '.join(c.name for c in angles)} is not clear")
     return angles, "in the file's order, tail to head,"
 
 
 def _markers(path: Path, columns: list[Column], n_point: int) -> list[Column]:
     sides = [
-        sorted((c for c in columns if axis in c.words), key=lambda column: column.numbers)
-        for axis in "xy"
+        sorted((c for c in columns if axis in c.words), key=lambda c: c.numbers) for axis in "xy"
     ]
-    x, y = ([column.numbers for column in side] for side in sides)
+    x, y = ([c.numbers for c in side] for side in sides)
     if x != y or len({*x}) < len(x) or len(x) != n_point:
         raise ProblemError(
             f"{path}: its columns {_ends(columns)} are x of {len(x)} points and y of {len(y)}; a "
             f"body of {n_point - 1} links has {n_point} points, its ends and joints: call them "
             f"x_1, y_1 (the tail), x_2, ..."
         )
-    return [column for pair in zip(*sides, strict=True) for column in pair]
+    return [c for pair in zip(*sides, strict=True) for c in pair]
 
 
 def _from_markers(
@@ -321,10 +320,12 @@ def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, s
         stamps = []
         for row in table.cells:
             text = row[column.at].replace(",", ".")
-            if re.match(r"\d{1,2}:", text):  # a time of day
-                text = f"2000-01-01 {'0' * (text[1] == ':')}{text}"
             try:
-                stamps.append(datetime.fromisoformat(text).timestamp())
+                if re.match(r"\d+:\d+[:.]", text):  # of a clock, or minutes and seconds
+                    parts = enumerate(reversed(text.split(":")))
+                    stamps.append(sum(float(part) * 60**k for k, part in parts))
+                else:
+                    stamps.append(datetime.fromisoformat(text).timestamp())
             except ValueError:
                 stamps.append(np.nan)
         if np.isnan(stamps[0]):
@@ -332,7 +333,9 @@ def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, s
                 f"{path}, line {table.lines[0]}: the time {table.cells[0][column.at]!r} is no "
                 f"number, and no date and time as 2026-01-31T12:00:00.05: write seconds."
             )
-        return np.array(stamps) - stamps[0], "of day, in s"
+        time = np.array(stamps) - stamps[0]
+        time[time < -43_200] += 86_400 * (stamps[0] < 86_400)  # past midnight, without a date
+        return time, "of day, in s"
     if not table.names:
         return time, "in the first column"
     if column.kind == "count":
@@ -345,7 +348,7 @@ def _rows(
     path: Path, table: Table, time: np.ndarray, clock: list[Column], joints: list[Column]
 ) -> tuple[np.ndarray, list[str]]:
     """Numbers of the rows that are samples, and notes on the others."""
-    needed = [column.at for column in (*clock[:1], *joints)]
+    needed = [c.at for c in (*clock[:1], *joints)]
     together = np.vstack([time, table.values[:, needed[-len(joints) :]].T])
     whole = np.isfinite(together).all(axis=0)
     for k in np.flatnonzero(~whole):

@@ -15,7 +15,8 @@ _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|
 _BLANK = frozenset(
     ("", "nan", "na", "n/a", "#n/a", "null", "none", "nil", "-", "--", "?", "inf", "+inf", "-inf")
 )
-_COMMENT = re.compile(r"\s*(#|%|//)[\s#%/]*")
+_COMMENT = re.compile(r"^\s*(#|%|//)[\s#%/]*")
+_THOUSANDS = re.compile(r"[+-]?(?!0,)\d{1,3}(,\d{3})*")
 _MANY = 500  # lines from which delimiter and width are determined
 _LARGEST = 1e150  # sums of squares of smaller numbers are finite
 
@@ -53,7 +54,7 @@ def read_table(path: Path) -> Table:
     delimiter = max(_DELIMITERS, key=fit)
     rows = []
     for k, line in enumerate(lines, 1):
-        if cells := _split(_COMMENT.sub("", line, count=1), delimiter):
+        if cells := _split(_COMMENT.sub("", line), delimiter):
             rows.append(_Row(k, cells, bool(_COMMENT.match(line))))
     usual = [row.cells for row in rows[: 4 * _MANY] if not row.comment][-_MANY:]
     if usual and all(cells[-1] == "" for cells in usual):  # a delimiter at the end of every line
@@ -82,6 +83,11 @@ def read_table(path: Path) -> Table:
         points = any("." in cell for cell in some)
         notes.append("commas in numbers" if points else "decimal commas")
     texts = [row.cells for row in data]
+    for j, column in enumerate(zip(*texts, strict=True)):
+        written = [cell for cell in column if not is_blank(cell)]
+        if len({"," in x for x in written}) > 1 and all(map(_THOUSANDS.fullmatch, written)):
+            for row in texts:
+                row[j] = row[j].replace(",", "")
     values = np.array([list(map(_number, row)) for row in texts]).reshape(len(data), width)
     before = "\n".join(lines[: rows[first].line - 1 if first < len(rows) else None])
     return Table(names, units, values, texts, [row.line for row in data], before, notes)
@@ -179,9 +185,9 @@ def _number(cell: str) -> float:
         if "," in cell:
             decimal = "." if cell.rfind(".") > cell.rfind(",") or cell.count(",") > 1 else ","
             cell = cell.replace("." if decimal == "," else ",", "").replace(",", ".")
-        if not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", cell):
+        if not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", cell):
             return np.nan
-        number = float(cell)
+        number = float(re.sub("[dD]", "e", cell))
     return number if abs(number) < np.inf and "_" not in cell else np.nan
 
 
