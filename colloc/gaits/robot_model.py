@@ -21,7 +21,6 @@ from colloc.system.errors import ProblemError
 
 _SMALL = 1e-3  # sine of an angle, or part of a length or mass, that counts as none
 _OFF = 0.05  # distance of a link's mass from its middle that is spoken of, over its length
-_COVERED = 0.9  # part of a link from which on its solids count as the whole
 _ROLLS = 0.5  # friction along over that across, below which a contact is a wheel
 _LINE = 16  # Gauss points of a pad in MJCF
 _RARE = "include replicate attach frame *[@xyaxes] *[@zaxis] *[@axisangle]"
@@ -78,7 +77,7 @@ class _Part:
     """Middle, half axes as columns, and the norm that tells how far they reach: 1 of a box."""
 
     def reach(self, way: np.ndarray) -> list[float]:
-        """How far each solid reaches in a direction."""
+        """How far each solid reaches that way."""
         return [float(x @ way + np.linalg.norm(way @ axes, n)) for x, axes, n in self.solids]
 
 
@@ -326,9 +325,9 @@ def _chain(parts: list[_Part]) -> Model:
             )
         at = np.insert(at, 0 if k == 0 else at.size, side * max(tips))
     lengths, wheels = np.diff(at), [x for x in stand if x.kind == "hinge"]
-    # feet of next to no mass are points of contact
-    borne = [[x.mass for x in stand if x.mass > _SMALL * y.mass and x.parent is y] for y in links]
-    masses = [math.fsum([y.mass, *more]) for y, more in zip(links, borne, strict=True)]
+    # lighter ones are points of contact
+    heavy = [x for x in stand if x.parent and x.mass > _SMALL * x.parent.mass]
+    masses = [math.fsum(x.mass for x in (y, *heavy) if y in (x, x.parent)) for y in links]
     if min(masses) <= 0:
         masses = []
         notes.append("a link has no mass there, so all have weights in proportion to their lengths")
@@ -371,7 +370,7 @@ def _chain(parts: list[_Part]) -> Model:
         elif not rows:
             reached = (max(part.reach(way), default=math.inf) for way in (-ahead, ahead))
             ends = ((np.array([*reached]) * (-1, 1) - at[k]) / lengths[k]).clip(0.0, 1.0)
-            low, high = ends if 0 < np.ptp(ends) < _COVERED else (0.0, 1.0)
+            low, high = ends if 0 < np.ptp(ends) < 0.9 else (0.0, 1.0)
             feet.append(f"Pad({k}, {low:.4f}, {high:.4f})")
         feet += [f"{kind}({k}, {place:g}{more})" for place, kind, more in rows]
     if all(foot.endswith(", 0.0000, 1.0000)") for foot in feet):

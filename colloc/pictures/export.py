@@ -82,7 +82,7 @@ _AXIS, _MASS = 1e-4, 1e-6  # half length of a capsule, and mass of a foot, in th
 _STIFF = 5000.0  # gain of the position servos per rad, over the largest torque of the gait
 _SPIN = 1e-3  # moment of inertia of a wheel, in load times radius squared
 _LEAST = 1e-5  # smallest coefficient of friction in MuJoCo
-_RESERVE = 1.5  # effort and speed of a joint in a URDF that states none, over the gait's largest
+_RESERVE = 1.5  # effort and speed in a URDF where none are stated, over the gait's largest
 
 
 @checked_arguments
@@ -153,25 +153,15 @@ def write_export(
         raise ProblemError("degrees are for angles in CSV and JSON: leave them out.")
     if servo and path.suffix not in (".csv", ".h"):
         raise ProblemError(f"pulses of servos are written as .csv or .h, not {path.suffix}.")
-    of_motors: dict[str, Any] = {}
+    if path.suffix in MODELS:
+        if max_speed is not None:
+            raise ProblemError("a model for simulators holds no motion: leave max_speed out.")
+        return _write_model(solution.robot(length, mass, period, gravity=gravity), path)
     if problem.robot is not None:
         stated = stated_robot(solution, length=length, mass=mass, period=period, gravity=gravity)
         length, mass, gravity = (stated[name] for name in ("length", "mass", "gravity"))
-        of_motors = {name: stated[name] for name in ("max_speed", "max_torque")}
         period = period if max_speed is not None else stated["period"]
     gravity = GRAVITY if gravity is None else gravity
-    if path.suffix in MODELS:
-        if period is None or length is None or mass is None:
-            raise ProblemError(
-                "a model for simulators needs the period [s], the length [m] and the mass [kg] of "
-                "the robot."
-            )
-        if max_speed is not None:
-            raise ProblemError(
-                "a model for simulators holds no motion: leave max_speed out, and write the angles "
-                "as CSV."
-            )
-        return _write_model(RobotSheet(solution, length, mass, period, gravity, **of_motors), path)
     limits = None if max_speed is None else np.array(max_speed, dtype=float)
     gait, paced_by, froude = solution.gait.motor_gait, problem.paced_by, solution.froude
     trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=bool(paced_by))
@@ -200,13 +190,10 @@ def write_export(
         holds = "in a period of 1"
         if froude:
             unit, holds = froude * pressing(solution, gravity), f"at Froude number {froude:.4g}: "
-            if length is None:
-                holds += f"a robot of {unit * trajectory.period**2:.3g} m at this period"
-            else:
-                needed = math.sqrt(length / unit)
-                holds += f"a robot of {length:.3g} m in {needed:.4g} s"
-                if not math.isclose(needed, trajectory.period, rel_tol=1e-6):
-                    holds += f"; this cycle takes {trajectory.period:.4g} s"
+            needed = math.sqrt(length / unit) if length else trajectory.period
+            holds += f"a robot of {unit * needed**2:.3g} m in {needed:.4g} s"
+            if abs(trajectory.period - needed) > 1e-6 * needed:
+                holds += f"; this cycle takes {trajectory.period:.4g} s"
         facts["pace"] = f"the gait's own, as {paced_by}; distance and work hold {holds}"
         facts |= {"froude_number": froude} if froude else {}
 
@@ -359,9 +346,8 @@ def _write_model(robot: RobotSheet, path: Path) -> dict[str, Any]:
             "a URDF says nothing of friction, nor of how the weight is spread over what touches "
             "the floor"
         )
-        of = {"efforts": robot.max_torque, "velocities": robot.max_speed}
-        if guessed := [name for name, most in of.items() if most is None]:
-            note += f"; {' and '.join(guessed)} are {_RESERVE:g} times the gait's"
+        if robot.max_torque is None or robot.max_speed is None:
+            note += f"; limits not stated are {_RESERVE:g} times the gait's"
     elif not rate_independent(problem.law):
         note = (
             f"contacts of MuJoCo have dry friction alone, not {law.label}: the model touches no "
@@ -472,8 +458,7 @@ def mjcf(robot: RobotSheet, *, contacts: bool = True) -> str:
 
 
 def urdf(robot: RobotSheet) -> str:
-    """The robot as a URDF; link_1 is its tail. Efforts and speeds are the motors', as far as they
-    are stated, else 1.5 times the gait's."""
+    """The robot as a URDF; link_1 is its tail. Limits not stated are 1.5 times the gait's."""
     return _xml("robot.urdf", robot, parts=_links(robot), reserve=_RESERVE)
 
 

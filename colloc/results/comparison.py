@@ -19,7 +19,7 @@ its own image, and the image turns the other way.
 
 import json
 from contextlib import suppress
-from itertools import product
+from itertools import count, product
 
 import numpy as np
 
@@ -40,15 +40,14 @@ Rows = list[tuple[str, str, str]]
 def compare(a: Solution, b: Solution) -> tuple[Rows, Rows]:
     """Numbers of two results, and fields in which their problems differ: name and both values."""
     fields = _rows(_fields(a), _fields(b))
-    changes = [(name, _around(x, y), _around(y, x)) for name, x, y in fields if x != y]
+    changes = [(name, _part(x, y), _part(y, x)) for name, x, y in fields if x != y]
     return _rows(_numbers(a), _numbers(b)), changes
 
 
-def _around(text: str, other: str) -> str:
-    """The part of a text, of 44 characters at most, where it differs from another."""
-    pairs = enumerate(zip(f"{text} ", f"{other} ", strict=False))
-    first = next(k for k, (x, y) in pairs if x != y)
-    return text[:44] if first < 40 else f"...{text[first - 20 : first + 21]}"
+def _part(text: str, other: str) -> str:
+    """44 characters of a text, among them the first that differs from another."""
+    at = next(k for k in count(0, 40) if text[k:][:40] != other[k:][:40])
+    return "..." * (at > 0) + text[at:][:44]
 
 
 def _rows(one: dict[str, str], two: dict[str, str]) -> Rows:
@@ -59,13 +58,13 @@ def _fields(solution: Solution) -> dict[str, str]:
     texts, problem = dict[str, str](), solution.problem
     for name, value in problem.to_dict().items():
         parts = value if isinstance(value, dict) and name != "guess" else {"": value}
-        stated = {f"{name} {part}".strip(): x for part, x in parts.items() if x is not None}
-        texts |= {part: json.dumps(x) for part, x in stated.items()}
-    guess = texts.pop("guess")
-    with suppress(ProblemError):  # none
-        if guess == json.dumps(problem.with_(guess=None).to_dict()["guess"]):
-            return texts
-    return texts | {"guess": f"moves by {_degrees(problem.guess)} deg"}
+        stated = ((f"{name} {part}".strip(), x) for part, x in parts.items() if x is not None)
+        texts |= {part: json.dumps(x) for part, x in stated}
+    texts["guess"] = f"moves by {_degrees(problem.guess)} deg"
+    with suppress(ProblemError):
+        if problem.with_(guess=None).hash == problem.hash:
+            del texts["guess"]  # nobody stated it
+    return texts
 
 
 def _degrees(gait: AnyGait) -> str:
@@ -113,8 +112,8 @@ def verdict(a: Solution, b: Solution) -> tuple[bool, str]:
     what, other = a.problem.objective, b.problem.objective
     if other != what:
         names = f"{what.name} and {other.name}"
-        if what.name == other.name:
-            names = f"{what.name}, of terms with other weights (idle power: by the robot)"
+        if other.name == what.name:
+            names = f"{what.name} with other weights (idle power: by the robot)"
         return False, f"other objectives: {names}."
     values = [each.measured.value for each in (a, b)]
     difference = abs(values[0] - values[1]) / max(*map(abs, values), 1e-300)

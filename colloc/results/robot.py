@@ -226,9 +226,8 @@ class RobotSheet:
         problem, froude = self.solution.problem, self.solution.froude
         if froude and abs(self.froude / froude - 1.0) > _SAME_PACE:
             needed = math.sqrt(self.length / (self.pressing * froude))
-            cure = f"froude={self.froude:.4g}"
-            if problem.robot is not None:
-                of_robot = stated_robot(self.solution)
+            cure, of_robot = f"froude={self.froude:.4g}", stated_robot(self.solution)
+            if of_robot:
                 changes = (f"{x}={y:.4g}" for x, y in sizes.items() if y != of_robot[x])
                 cure = f"{', '.join(changes)} in its robot"
             raise ProblemError(
@@ -333,6 +332,9 @@ class RobotSheet:
         for name, unit in (("torque", "N_m"), ("speed", "rad_per_s")):
             facts[f"peak_{name}_{unit}"] = np.abs(rows[name]).max(axis=1).tolist()
             facts[f"rms_{name}_{unit}"] = np.sqrt((rows[name] ** 2).mean(axis=1)).tolist()
+            if (limits := getattr(self, f"max_{name}")) is not None:
+                facts[f"max_{name}_{unit}"] = limits.tolist()
+                facts[f"{name}_used"] = (facts[f"peak_{name}_{unit}"] / limits).tolist()
         facts["peak_joint_power_W"] = powers.max(axis=1).tolist()
         if problem.froude:
             with suppress(NotConvergedError):
@@ -345,10 +347,6 @@ class RobotSheet:
                 if rate_independent(problem.law):
                     slow = self.length / (self.gravity * solution.slow_enough(SLOW_ENOUGH))
                     facts["slow_enough_period_s"] = math.sqrt(slow)
-        for name, unit in (("speed", "rad_per_s"), ("torque", "N_m")):
-            if (limits := getattr(self, f"max_{name}")) is not None:
-                facts[f"max_{name}_{unit}"] = limits.tolist()
-                facts[f"{name}_used"] = (facts[f"peak_{name}_{unit}"] / limits).tolist()
         if self.max_speed is not None and not problem.froude:
             gait, limits = solution.gait.motor_gait, np.asarray(self.max_speed)
             shortest = facts["shortest_period_s"] = shortest_period(gait, limits, keep_pace=True)

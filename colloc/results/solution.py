@@ -39,7 +39,6 @@ from colloc.results.motion import (
 from colloc.system.arguments import checked_arguments
 from colloc.system.environment import higher, versions
 from colloc.system.errors import ProblemError
-from colloc.verification.adaptive_motion import Replay
 from colloc.verification.dry_friction import DryFriction, dry_friction
 from colloc.verification.replay import replayer
 
@@ -183,27 +182,18 @@ class Solution:
         return play(*at, *more, breaks=self.gait.corner_phases, **how)
 
     @cached_property
-    def quasi_static(self) -> Replay:
-        """The same gait without inertia; its distance is the chord of the arc on which it goes
-        then, whatever phase it begins at. `NotConvergedError` if a slope does not hold it."""
-        p = self.problem
-        play = replayer(p.regime.slowly)
-        how: Any = {"quantities": p.objective.integrals}
-        turn = self.played_by(play, turn=p.rotation or 0.0, **how).rotation
-        return self.played_by(play, turn=turn, **how)
+    def quasi_static(self) -> Any:
+        """Replay without inertia, with the chord of its arc, whatever phase it begins at;
+        `NotConvergedError` if a slope does not hold it."""
+        play, asked = replayer(self.problem.regime.slowly), self.problem.objective.integrals
+        turn = self.played_by(play, turn=self.problem.rotation or 0.0).rotation
+        return self.played_by(play, turn=turn, quantities=asked)
 
     @property
     def played_slowly(self) -> float:
         """The objective of the same gait without inertia, at this period."""
         period = {"period": self.froude**-0.5} if self.froude else {}
         return float(self.problem.objective({**self.quasi_static.values, **period}))
-
-    @property
-    def slow_motion(self) -> str:
-        """What changes where inertia is left out, in words."""
-        turn = math.degrees(self.quasi_static.rotation)
-        turns = abs(turn - math.degrees(self.rotation)) > 0.1
-        return "without inertia at this period" + f", turning by {turn:.3g}° per cycle" * turns
 
     @property
     def cycles_from_rest(self) -> tuple[int, float]:

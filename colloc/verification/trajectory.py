@@ -65,7 +65,7 @@ def plan_trajectory(
             f"a cycle of {wanted:g} s is too short for the joint speed limits{kept}; use at least "
             f"{shortest:.6g} s."
         )
-    count = int(np.ceil(wanted * rate * (1 - 1e-6)))  # one at its bound is a little longer
+    count = int(np.ceil(wanted * rate * (1 - 1e-6)))  # one at its bound is longer
     if not 4 <= count <= MOST_SAMPLES:
         raise ProblemError(
             f"{count:g} samples per cycle are too {'few' if count < 4 else 'many'}; change the "

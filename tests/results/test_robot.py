@@ -304,7 +304,7 @@ def test_an_export_on_a_slope_is_of_the_shorter_robot_that_has_that_pace_there(u
     stated = Problem("steep", leaning, gait=Harmonic(1), delta=1e-2, froude=0.05, grade=0.75)
     solution, length = unsolved(stated), 0.05 * 0.8 * 9.81 * 2.0**2
     facts = solution.export(tmp_path / "x.csv", period=2.0, ramp=False)
-    assert f"a robot of {length:.3g} m at this period" in facts["pace"]
+    assert f"a robot of {length:.3g} m in 2 s" in facts["pace"]
     assert solution.robot(length, MASS, 2.0).froude == pytest.approx(0.05)
 
 
