@@ -427,6 +427,7 @@ Quantity("x", "sum(1 / (rate - rate))") -> not finite for typical values
 Problem.from_dict({**PROBLEM.to_dict(), "body": {"kind": "Belt"}}) -> Belt is none of Chain
 replay(ModalBody(2), Chain(feet=(Foot(0), Wheel(1), Foot(2))).law(Friction()), GAIT, 1e-2) -> feet have laws of friction of their own
 evaluate(PROBLEM, np.ones((2, 5))) -> angles at 6 times or more
+evaluate(PROBLEM, GAIT).cycles_from_rest | replay(Chain(), Friction(), GAIT, 0.1, breaks=[2.0]) | replay(Chain(), Friction(), GAIT, 0.1, breaks=[-0.5]) | replay(Chain(), Friction(), lambda t: (np.array([t, 0 * t]), np.ones((2, t.size))), 0.1) -> cycle|breaks must rise
 evaluate(PROBLEM, 40 * GAIT.angles(np.arange(60) / 60)) -> if angles are degrees, say so
 evaluate(PROBLEM, GAIT.angles(np.arange(60) / 60), period=200) -> holds 59 of a period of 200
 CrawlerBody(0.05).concertina(1.3, way=(0.9,)) | CrawlerBody(0.05).concertina(1.3, way=(0.9, "text")) | CrawlerBody(0.05).concertina(1.3, way=0.9) | CrawlerBody(0.05).concertina(1.3, sides=3) | CrawlerBody(0.05).concertina("wide") -> must be

@@ -201,6 +201,8 @@ class Solution:
         as once it has settled, within 2 %; and how far it goes in the last of them."""
         from colloc.verification.differential_motion import GaitWithInertia
 
+        if not self.froude:
+            raise ProblemError("without inertia all cycles are alike: state froude, or a robot.")
         state, way, cycles = np.zeros(7), 0.0, 0
         moving = self.played_by(GaitWithInertia, froude=self.froude, regime=self.problem.regime)
         state[3] = moving.theta

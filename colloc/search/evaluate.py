@@ -436,10 +436,17 @@ def identify(
                 "with inertia the motion determines all coefficients: leave mu_forward out."
             )
         fit.stated *= mu_forward / fit.stated[fit.forward]
-    x = np.zeros(len(fit.free))
+    x, best = np.zeros(len(fit.free)), math.inf
     before = fit.rms(fit.off(x))
-    for _ in range(2):  # then with the noise of places and of headings
-        x = fit.best(x)
+    for begin in (0.0, 0.7, -0.7):  # of logarithms: squares may have several minima
+        trial = np.full(x.size, begin)
+        for _ in range(2):  # then with the noise of places and of headings
+            trial = fit.best(trial)
+        if (after := fit.rms(fit.off(trial))) < best:
+            x, best, noise = trial, after, fit.noise
+        if best <= _MISSED * fit.extent:
+            break
+    fit.noise = noise
     alike, covariance = fit.covariance(x, fitted.uncertainty)
     squares, directions = np.linalg.eigh(covariance) if x.size else (x, covariance)
     untold = directions.T[squares > _UNTOLD**2]

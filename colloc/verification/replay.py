@@ -27,6 +27,7 @@ from colloc.mechanics.densities import LENGTH, Instants, Limits, Quantity, limit
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import FORWARDS, followed_motion
 from colloc.smooth.smooth_body import accurate_motion
+from colloc.system.arguments import check_finite
 from colloc.system.errors import ProblemError
 from colloc.verification.adaptive_motion import Path, Replay, lever, poses, whole_totals
 from colloc.verification.differential_motion import ONE_SIDED, GaitOnSlope, GaitWithInertia
@@ -257,6 +258,12 @@ def replay(
     >>> round(measured.efficiency, 4)
     0.26
     """
+    check_finite(positive=True, tolerance=tolerance)
+    ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
+    if not (np.diff(ends) > 0).all():
+        raise ProblemError("breaks must rise, and lie between 0 and 1.")
+    if np.abs(np.diff(path(np.array([0.0, 1.0]))[0])).max() > _CORNER:
+        raise ProblemError("the path is no cycle: it must end at the angles where it begins.")
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     joint_map = getattr(path, "joint_map", None)
     limits = limits_of(limits, joint_map.n_motor if joint_map else body.n_joint)
@@ -305,7 +312,6 @@ def replay(
         return tuple(each.T.reshape(*t.shape, *each.shape[:-1]) for each in found)
 
     # equal panels between any two corners, where rates are one-sided
-    ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
     pieces = [(a, b, 2 * max(1, round(instants * (b - a) / 8))) for a, b in pairwise(ends)]
     edges = np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), 1.0)
     t = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, 5)
