@@ -264,10 +264,9 @@ def multistart(
     """Candidates on a coarse mesh, best first, and the number of starts, at least one."""
     slow = slow_optima(problem)
     run, ahead = active_run(), active_run().ahead
-    usual = OPTIONS.starts
-    if problem.regime.froude:  # of slow motion hops follow, without them all starts are new
-        usual = usual // 2 if slow else usual * OPTIONS.max_starts
-    count = starts or usual
+    count = starts or OPTIONS.starts
+    if problem.regime.froude and not starts:  # where all is known of slow motion hops are left
+        count = count // 2 if slow else count * OPTIONS.max_starts
     most = OPTIONS.max_starts * count
     coarse = problem.with_(intervals=min(problem.intervals, problem.usual_intervals // 2))
     # gaits are compared where friction is nearly dry
