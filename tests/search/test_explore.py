@@ -163,7 +163,7 @@ def test_a_search_for_a_least_distance_begins_at_the_gaits_that_go_farthest(monk
     monkeypatch.setattr(explore, "small_loops", lambda problem: [])
     monkeypatch.setattr(explore, "farthest", lambda far: [SimpleNamespace(value=0.2, gait=GAIT)])
     stated = Problem("far", gait=Harmonic(1, "bilateral"), delta=1e-2, least_distance=0.3)
-    said = "goes 0.2 body lengths per cycle, less than the 0.3 required, so half of that was required: 0.1."
+    said = "known at first goes 0.2 body lengths per cycle, less than the 0.3 required, so half of that was required: 0.1."
     assert said in solve(stated, 2).message
     assert begun[0] == (GAIT, False)
     assert begun[1][1]
