@@ -80,8 +80,9 @@ def solve(
             least = {aim.name: least for aim, least in reachable.at_least}.get("distance")
             if asked is not None and least is not None and least < asked:
                 solution.message = (
-                    f"The farthest gait known at first goes {2 * least:.3g} body lengths per cycle, "
-                    f"less than the {asked:g} required, so half of that was required: {least:.3g}. "
+                    f"The farthest gait known at first goes {2 * least:.3g} body lengths per "
+                    f"cycle, less than the {asked:g} required, so half of that was required: "
+                    f"{least:.3g}. "
                     f"{solution.message}"
                 ).strip()
     except KeyboardInterrupt:

@@ -141,7 +141,7 @@ def test_where_the_farthest_gait_goes_less_half_of_its_distance_is_asked_for():
     # how far the farthest goes is known on a coarse mesh
     assert least == pytest.approx(0.5 * farthest.distance, rel=0.1)
     assert solution.distance >= least * (1 - 1e-6)
-    assert f"The farthest gait known before goes {2 * least:.3g} body lengths" in solution.message
+    assert f"The farthest gait known at first goes {2 * least:.3g} body lengths" in solution.message
     assert f"so half of that was required: {least:.3g}" in solution.message
 
 
