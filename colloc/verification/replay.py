@@ -262,7 +262,8 @@ def replay(
     ends = np.concatenate([[0.0], np.asarray(breaks, dtype=float), [1.0]])
     if not (np.diff(ends) > 0).all():
         raise ProblemError("breaks must rise, and lie between 0 and 1.")
-    if not np.allclose(*path(np.array([0.0, 1.0]))[0].T, rtol=0, atol=_CORNER):
+    begin, end = path(np.array([0.0, 1.0]))[0].T
+    if not np.allclose(begin, end, rtol=0, atol=_CORNER):
         raise ProblemError("the path is no cycle: it must end at the angles where it begins.")
     asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     joint_map = getattr(path, "joint_map", None)
