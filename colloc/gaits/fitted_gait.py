@@ -220,11 +220,13 @@ class _Samples(NamedTuple):
     def check(self, period: float | None, harmonics: int | None) -> None:
         step, most, span = self.step, (self.time.size - 3) // 2, self.time[-1]
         what = ""
-        if period is not None:
+        if period is None:
+            period = np.nan
+        else:
             check_finite(positive=True, period=period)
-        if period is not None and span < 0.5 * period:
+        if span < 0.5 * period:
             what = f"{self.name} holds {span:.4g} of a period of {period:.4g}: record at least one."
-        elif period is not None and period < FEWEST * step:
+        elif period < FEWEST * step:
             what = (
                 f"{self.name} has a sample every {step:.4g}, fewer than {FEWEST} in a period of "
                 f"{period:.4g}: give the period in the file's unit of time."

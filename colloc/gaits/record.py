@@ -38,13 +38,8 @@ _WORDS = {
 }
 """Words in names of columns, as regular expressions; "other" are columns that are no angles."""
 HEADINGS = {"theta", "yaw", "heading"}  # of a link, without a number
-_SECOND = {"": 1, "m": 1e3, "milli": 1e3, "n": 1e9, "nano": 1e9} | dict.fromkeys(
-    ("u", "µ", "micro"), 1e6
-)
-_ROUNDED = 0.15  # share of unequal time steps from which equal steps were rounded
-_MOST = 5_000  # samples; of more, every second, third ... is taken
-_CENTRED = np.radians(20)
-"""Servos that know no negative angles are centred within it of a right angle."""
+_SECOND = {"": 1, "m": 1e3, "milli": 1e3, "n": 1e9, "nano": 1e9, "u": 1e6, "µ": 1e6, "micro": 1e6}
+_MOST = 5_000  # samples
 _ASTRAY = 0.03  # distance of markers from what is a link, in body lengths, that is refused
 
 
@@ -61,7 +56,7 @@ class Record(NamedTuple):
 
     def describe(self, used: Collection[Column] = ()) -> str:
         """What was read, and what was left out, unless it was of use elsewhere."""
-        left = [column.name for column, _ in self.others if column not in used]
+        left = [c.name for c, _ in self.others if c not in used]
         more = f" and {len(left) - 3} more" if len(left) > 3 else ""
         return f"{self.taken}{'; ignored: ' * bool(left)}{', '.join(left[:3])}{more}"
 
@@ -92,13 +87,12 @@ class Column(NamedTuple):
     @property
     def kind(self) -> str:
         """One of "time", "count", "other", "place" and, if nothing else, "angle"."""
-        words, unit = self.words, self.words[-2:]
+        words = self.words
         units = [w for w in words if re.fullmatch(_WORDS["unit of time"], w)]
         if self.last("time") or 0 < len(units) == len(words):
             return "time"
-        # a number and a unit, as 1 v; a velocity; newton metres
-        other = words[:1] == ("v",) or unit == ("n", "m")
-        other |= len(unit) > 1 and unit[0].isdecimal() and unit[1] in ("w", "a", "v", "c")
+        # a velocity; newton metres; a number and a unit, as 1 v
+        other = re.fullmatch(r"v( .*)?|(.* )?(n m|\d+ [wavc])", " ".join(words))
         rate = re.search(r"(rad|deg|°|rev)\w*\s*/\s*s|n·m", self.name, re.I)
         if rate or other or self.last("other"):
             is_current = self.last("angle") and "current" in words and not rate
@@ -132,11 +126,16 @@ def read_record(
             f"{path}: all times are {time[0]:g}: give a column of times that rise, or none for "
             f"equal steps."
         )
-    time, even = _even_steps(time)
-    if (every := -(-rows.size // _MOST)) > 1:
-        time, rows = time[::every], rows[::every]
-        notes.append(f"of {len(table.lines)} rows, one in {every} taken")
     raw, places = table.values[rows][:, [c.at for c in joints]].T, None
+    time, even = _even_steps(time, raw)
+    every = -(-rows.size // _MOST)
+    # long steps would hide a period
+    while every > 1 and np.abs(np.diff(raw[:, ::every])).mean() > 0.15 * raw.std(axis=1).mean():
+        every //= 2
+    if rows.size > _MOST:
+        first = slice(0, every * _MOST, every)
+        time, rows, raw = time[first], rows[first], raw[:, first]
+        notes.append(f"of {len(table.lines)} rows, the first {rows.size} in steps of {every} taken")
     if body is not None and joints[0].kind == "place":
         units = np.ones(n_joint)
         raw, places, length = _from_markers(path, raw.reshape(-1, 2, rows.size), body)
@@ -159,10 +158,9 @@ def read_record(
     period = float(stated[1]) if stated and unit == "in s" else None
     of_time = re.search(r"in (\w*?)(s|secs?|seconds?)$", unit)
     second = _SECOND.get(of_time[1]) if of_time else None
-    centres = 0.5 * (angles.max(axis=1) + angles.min(axis=1))
-    right = np.round(np.median(centres) / (np.pi / 2)) * (np.pi / 2)
-    centred = n_joint > 1 and np.abs(centres - right).max() < _CENTRED
-    centre = int(np.degrees(right).round()) if centred else 0
+    centres = (angles.max(axis=1) + angles.min(axis=1)) / np.pi
+    right = round(np.median(centres))
+    centre = 90 * right * (n_joint > 1 and bool(np.abs(centres - right).max() < 20 / 90))
     left = (c for c in columns if c.name and c not in clock + joints)
     others = [(c, table.values[rows, c.at]) for c in left]
     read = time - time[0], angles, bool(in_degrees.all()), period, "; ".join(facts), centre
@@ -191,6 +189,12 @@ def _columns(
     both = zip(table.names, table.units, strict=True)
     columns = [Column(j, " ".join(each).strip()) for j, each in enumerate(both)]
     varies = [c for c in columns if len({row[c.at] for row in table.cells}) > 1]
+    cells = {row[c.at]: 0 for c in columns if "name" in c.words for row in table.cells}
+    names = re.findall(r"[^][()\s,'\"]+", " ".join(cells))  # of joints, as ROS has them
+    positions = sorted((c.numbers, c.at) for c in columns if "position" in c.words)
+    if len(names) == len(positions):
+        for (_, j), name in zip(positions, names, strict=True):
+            columns[j] = Column(j, name)
     times = [c for c in varies if c.kind == "time"]
     times.sort(key=lambda c: "date" in c.words)
     whole = [c for c in times if {"sec", "secs"} & {*c.words}][:1]
@@ -219,12 +223,10 @@ def _joints(
             f"its columns {_ends(places)} look like positions of points of the body; write joint "
             f"angles, each the direction of a link less that of the link behind it",
         )
-    measured = [c for c in angles if not c.last("commanded")]
-    if len(angles) > n_joint <= len(measured):
-        angles = measured
-    joints = [c for c in angles if not {*c.words} & HEADINGS or c.numbers]
-    if len(angles) > n_joint <= len(joints):
-        angles = joints
+    for other in (lambda c: c.last("commanded"), lambda c: {*c.words} & HEADINGS and not c.numbers):
+        joints = [c for c in angles if not other(c)]
+        if len(angles) > n_joint <= len(joints):
+            angles = joints
     sets: dict[tuple[str, ...], list[Column]] = {}
     for column in angles:
         sets.setdefault(column.skeleton, []).append(column)
@@ -322,8 +324,7 @@ def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, s
             text = row[column.at].replace(",", ".")
             try:
                 if re.match(r"\d+:\d+[:.]", text):  # of a clock, or minutes and seconds
-                    parts = enumerate(reversed(text.split(":")))
-                    stamps.append(sum(float(part) * 60**k for k, part in parts))
+                    stamps.append(float(np.polyval([*map(float, text.split(":"))], 60)))
                 else:
                     stamps.append(datetime.fromisoformat(text).timestamp())
             except ValueError:
@@ -351,20 +352,19 @@ def _rows(
     needed = [c.at for c in (*clock[:1], *joints)]
     together = np.vstack([time, table.values[:, needed[-len(joints) :]].T])
     whole = np.isfinite(together).all(axis=0)
-    for k in np.flatnonzero(~whole):
-        for j, value in zip(needed, together[-len(needed) :, k], strict=True):
-            if not np.isfinite(value) and not is_blank(cell := table.cells[k][j]):
-                name = table.names[j] if table.names else j + 1
-                raise ProblemError(
-                    f"{path}, line {table.lines[k]}, column {name}: {cell[:40]!r} is no number: "
-                    f"mend it, or leave the line out."
-                )
+    for k, i in np.argwhere(~np.isfinite(together[-len(needed) :].T)):
+        if not is_blank(cell := table.cells[k][j := needed[i]]):
+            name = table.names[j] if table.names else j + 1
+            raise ProblemError(
+                f"{path}, line {table.lines[k]}, column {name}: {cell[:40]!r} is no number: mend "
+                f"it, or leave the line out."
+            )
     rows, blank = np.flatnonzero(whole), int((~whole).sum())
     if 2 * rows.size < whole.size or rows.size < FEWEST:
         raise ProblemError(
-            f"{path}: only {rows.size} of {whole.size} lines have a number in each of the columns "
-            f"that are needed (line {table.lines[int(np.argmin(whole))]} has not), and at least "
-            f"{FEWEST} are: write all joints in every line."
+            f"{path}: only {rows.size} of {whole.size} lines have a number in each column needed "
+            f"(line {table.lines[int(np.argmin(whole))]} has not), and {FEWEST} must: write all "
+            f"joints in every line."
         )
     again = np.append(False, (np.diff(together[:, rows], axis=1) == 0).all(axis=0))
     counts = {"with blank cells": blank, "like the one before": int(again.sum())}
@@ -372,18 +372,20 @@ def _rows(
     return rows[~again], notes
 
 
-def _even_steps(time: np.ndarray) -> tuple[np.ndarray, str]:
+def _even_steps(time: np.ndarray, raw: np.ndarray) -> tuple[np.ndarray, str]:
     """Undo the rounding of equal steps of time, and say so."""
     steps = np.diff(time)
     unit = steps[steps > 0].min()
     whole = np.round(steps / unit)
     uneven = np.mean(whole != np.median(whole))  # a few are samples that were dropped
-    if np.abs(steps / unit - whole).max() > 1e-3 or not (whole.min() == 0 or uneven > _ROUNDED):
-        return time, ""
+    rounded = np.abs(steps / unit - whole).max() <= 1e-3 and (not whole.min() or uneven > 0.15)
     count = np.arange(time.size)
     step, begin = np.polyfit(count, time - time[0], 1)
     line = begin + step * count
-    if np.ptp(time - time[0] - line) > 1.2 * unit:
+    # exact stamps of which some are missing make smoother angles
+    kinks = (np.median(np.abs(np.diff(np.diff(raw) / np.diff(t)))) for t in (time, line))
+    exact = whole.min() and np.less(*kinks)
+    if exact or not rounded or np.ptp(time - time[0] - line) > 1.2 * unit:
         return time, ""
     return line, f", stamps rounded to {unit:.3g} taken as equal steps of {step:.4g}"
 

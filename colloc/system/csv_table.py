@@ -12,13 +12,10 @@ import numpy as np
 from colloc.system.errors import ProblemError
 
 _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|": "bars"}
-_BLANK = frozenset(
-    ("", "nan", "na", "n/a", "#n/a", "null", "none", "nil", "-", "--", "?", "inf", "+inf", "-inf")
-)
+_BLANK = re.compile(r"(nan|#?n/?a|null|none|nil|--?|\?|[+-]?inf)?", re.I)
 _COMMENT = re.compile(r"^\s*(#|%|//)[\s#%/]*")
 _THOUSANDS = re.compile(r"[+-]?(?!0,)\d{1,3}(,\d{3})*")
 _MANY = 500  # lines from which delimiter and width are determined
-_LARGEST = 1e150  # sums of squares of smaller numbers are finite
 
 
 class Table(NamedTuple):
@@ -58,8 +55,9 @@ def read_table(path: Path) -> Table:
             rows.append(_Row(k, cells, bool(_COMMENT.match(line))))
     usual = [row.cells for row in rows[: 4 * _MANY] if not row.comment][-_MANY:]
     if usual and all(cells[-1] == "" for cells in usual):  # a delimiter at the end of every line
-        rows = [row._replace(cells=row.cells[: -1 if not row.cells[-1] else None]) for row in rows]
-        usual = [cells[:-1] for cells in usual]
+        for row in rows:
+            if not row.cells[-1]:
+                row.cells.pop()
     width = Counter(map(len, usual)).most_common(1)[0][0] if usual else 0
     first = _first_row(rows, width, [cells for cells in usual if len(cells) == width])
     names, units = _names(path, rows[:first], width)
@@ -78,16 +76,16 @@ def read_table(path: Path) -> Table:
                 f"{path}, line {k}, names the columns again: the file holds two records; give one "
                 f"of them."
             )
-    some = [cell for row in data[:_MANY] for cell in row.cells]
-    if any("," in cell for cell in some if _is_number(cell)):
-        points = any("." in cell for cell in some)
+    some = [x for row in data[:_MANY] for x in row.cells]
+    if any("," in x for x in some if _is_number(x)):
+        points = any("." in x for x in some)
         notes.append("commas in numbers" if points else "decimal commas")
     texts = [row.cells for row in data]
     for j, column in enumerate(zip(*texts, strict=True)):
-        written = [cell for cell in column if not is_blank(cell)]
+        written = [x for x in column if not is_blank(x)]
         if len({"," in x for x in written}) > 1 and all(map(_THOUSANDS.fullmatch, written)):
-            for row in texts:
-                row[j] = row[j].replace(",", "")
+            for cells in texts:
+                cells[j] = cells[j].replace(",", "")
     values = np.array([list(map(_number, row)) for row in texts]).reshape(len(data), width)
     before = "\n".join(lines[: rows[first].line - 1 if first < len(rows) else None])
     return Table(names, units, values, texts, [row.line for row in data], before, notes)
@@ -101,9 +99,9 @@ def _first_row(rows: list[_Row], width: int, usual: list[list[str]]) -> int:
     def is_data(row):
         if row.comment or len(row.cells) != width or not numeric:
             return False
-        numbers = [_is_number(row.cells[j]) for j in numeric]
-        fits = [x or is_blank(row.cells[j]) for x, j in zip(numbers, numeric, strict=True)]
-        return 2 * sum(fits) >= len(fits) and fits[0] and any(numbers)
+        cells = [row.cells[j] for j in numeric]
+        fits = [_is_number(x) or is_blank(x) for x in cells]
+        return 2 * sum(fits) >= len(fits) and fits[0] and any(map(_is_number, cells))
 
     first = next((i for i, row in enumerate(rows) if is_data(row)), len(rows))
     if first + 1 < len(rows) and rows[first].cells == [str(j) for j in range(width)]:
@@ -119,7 +117,7 @@ def csv_table(path: Path, fewest: int) -> tuple[list[str], np.ndarray]:
     table = read_table(path)
     check_size(path, table, fewest)
     for k, row in enumerate(table.values, 1):
-        if not (np.abs(row) < _LARGEST).all():
+        if not (np.abs(row) < 1e150).all():  # sums of squares are finite
             text = ",".join(table.cells[k - 1])[:60]
             raise ProblemError(
                 f"{path}, sample {k}: {text!r} is not {row.size} finite numbers below 1e150."
@@ -142,9 +140,8 @@ def _text(path: Path) -> str:
         content = path.read_bytes()
     except OSError as error:
         raise ProblemError(f"cannot read {path}: {error.strerror or error}.") from None
-    marks = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
-    marked = (encoding for mark, encoding in marks.items() if content.startswith(mark))
-    for encoding in (next(marked, "utf-8"), "cp1252"):  # a spreadsheet's degree sign on Windows
+    usual = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+    for encoding in (usual, "cp1252"):  # a spreadsheet's degree sign on Windows
         try:
             text = content.decode(encoding)
         except UnicodeDecodeError:
@@ -164,12 +161,12 @@ def _split(line: str, delimiter: str) -> list[str]:
         row = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
     except csv.Error:  # a cell of more than 100 kB
         return [line]
-    cells = [cell.strip() for cell in row]
+    cells = [x.strip() for x in row]
     return cells if any(cells) else []
 
 
 def is_blank(cell: str) -> bool:
-    return cell.lower() in _BLANK
+    return bool(_BLANK.fullmatch(cell))
 
 
 def _is_number(cell: str) -> bool:
@@ -205,6 +202,6 @@ def _names(path: Path, rows: list[_Row], width: int) -> tuple[list[str], list[st
         )
     units = [""] * width
     unit = re.compile(r"[\[(]?[°µ\w/·%-]{0,12}[\])]?")
-    if len(fitting) > 1 and all(not cell or unit.fullmatch(cell) for cell in fitting[-1]):
+    if len(fitting) > 1 and all(not x or unit.fullmatch(x) for x in fitting[-1]):
         units = fitting.pop()
     return (fitting[-1] if fitting else []), units

@@ -35,7 +35,7 @@ def read(tmp_path, content, **settings):
     return fitted_gait(path, 3, **settings)
 
 
-ROS = "%time,field.header.seq,field.header.frame_id,field.name0,field.position0,field.position1,field.position2,field.velocity0\n"
+ROS = "%time,field.header.seq,field.header.frame_id,field.name0,field.name1,field.name2,field.position0,field.position1,field.position2,field.velocity0\n"
 TOPIC = "/joint_states/joint_"
 # fmt: off
 READ = {
@@ -47,7 +47,8 @@ READ = {
     "one column of degrees": ("t,joint_1_rad,joint_2_deg,joint_3_rad\n" + table(SECONDS, A, E, C), r"radians \(but joint_2_deg degrees\)"),
     "the joint at the tail in degrees": ("t,joint_1_deg,joint_2_rad,joint_3_rad\n" + table(SECONDS, D, B, C), r"radians \(but joint_1_deg degrees\)"),
     "units in a row": ("time,joint_1,joint_2,joint_3,current_1\ns,deg,deg,deg,mA\n" + table(SECONDS, D, E, F, T), "degrees; time in s; ignored: current_1 mA"),
-    "rostopic echo": (ROS + table(NANOSECONDS, range(60), ["base"] * 60, ["j"] * 60, A, B, C, A), "from field.position0"),
+    "rostopic echo": (ROS + table(NANOSECONDS, range(60), ["base"] * 60, *([f"j{j}"] * 60 for j in (3, 1, 2)), C, A, B, A), "from j1 ... j3"),
+    "a bag by pandas": ("Time,name,position_0,position_1,position_2\n" + table(SECONDS, ["\"['j3', 'j1', 'j2']\""] * 60, C, A, B), "from j1 ... j3"),
     "PlotJuggler": ("__time," + ",".join(f"{TOPIC}{j}/{what}" for j in (1, 2, 3) for what in ("position", "velocity")) + "\n" + table(1.7e9 + SECONDS, A, A, B, B, C, C, digits=16), "ignored: /joint_states/joint_1/velocity"),
     "driver of an arm": ("time_ms,read_attempt,joint_0_pos,joint_1_pos,joint_2_pos,joint_0_vel,joint_1_vel,joint_2_vel\n" + table(1000 * SECONDS, range(60), A, B, C, A, B, C), "from joint_0_pos ... joint_2_pos"),
     "commanded and measured": ("t,cmd_1,cmd_2,cmd_3,meas_1,meas_2,meas_3\n" + table(SECONDS, B, C, A, A, B, C), "from meas_1 ... meas_3"),
@@ -59,6 +60,7 @@ READ = {
     "a period in seconds": ("# period_s: 4\nt_ms,q1,q2,q3\n" + table(1000 * SECONDS, A, B, C), "time in ms"),
     "no times": ("Servo1 Position,Servo2 Position,Servo3 Position\n" + table(A, B, C), "time in equal steps"),
     "counted samples, two dropped": ("seq,q1,q2,q3\n" + table(*(np.delete(each, [7, 30]) for each in (np.arange(60), A, B, C))), r"time in samples \(seq\)"),
+    "every third row missing": ("t,q1,q2,q3\n" + table(*(np.delete(each, np.s_[2::3]) for each in (SECONDS * 3, A, B, C))), "time from t; 2 harmonics"),
     "no names": (table(1.7e9 + SECONDS, A, B, C, digits=16), "as it has no names"),
     "names in a comment": ("# t q1 q2 q3\n" + table(SECONDS, A, B, C, between=" "), "spaces between"),
     "an index of pandas": (",t,q1,q2,q3\n" + table(range(60), SECONDS, A, B, C), "time from t"),
@@ -200,13 +202,17 @@ def test_a_long_log_is_read_in_seconds(tmp_path):
     found = read(tmp_path, "t,q1,q2,q3\n" + table(4 * t, *GAIT.angles(t)))
     assert time.process_time() - begin < 10
     np.testing.assert_allclose(found.gait.angles(T), ANGLES, atol=1e-5)
-    assert "of 20000 rows, one in 4 taken" in found.describe()
+    assert "of 20000 rows, the first 5000 in steps of 4 taken" in found.describe()
 
 
-def test_of_a_long_log_rows_are_left_out_evenly(tmp_path, monkeypatch):
-    monkeypatch.setattr("colloc.gaits.record._MOST", 40)
-    found = read(tmp_path, "t,q1,q2,q3\n" + table(SECONDS, A, B, C))
-    assert "of 60 rows, one in 2 taken" in found.describe()
+@pytest.mark.parametrize(("rows", "every"), [(60, 1), (240, 5)])  # of a period
+def test_rows_of_a_long_log_are_left_out_only_if_the_others_follow_it(
+    rows, every, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("colloc.gaits.record._MOST", 120)
+    t = np.arange(600) / rows
+    found = read(tmp_path, "t,q1,q2,q3\n" + table(4 * t, *GAIT.angles(t)))
+    assert f"of 600 rows, the first 120 in steps of {every} taken" in found.describe()
     np.testing.assert_allclose(found.gait.angles(T), ANGLES, atol=1e-5)
 
 
