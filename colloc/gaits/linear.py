@@ -330,12 +330,13 @@ def _symmetric_tables(kind: LinearClass, n_joint: int) -> np.ndarray:
             f"the class {name} has no symmetry {kind.symmetry!r} for {n_joint} joints: its "
             f"functions {how} are no combinations of its functions. Take symmetry 'none'."
         )
-    from scipy.linalg import qr  # for columns alone: a tenth of a second
-
-    symmetric = np.eye(len(turned)) + turned
-    _, r, order = qr(symmetric, mode="economic", pivoting=True)
-    first = abs(r[0, 0])
-    rank = int((np.abs(np.diag(r)) > _CLOSED * first).sum()) if first > _CLOSED else 0
-    if rank == 0:
+    rest, columns = np.eye(len(turned)) + turned, list[int]()
+    symmetric, closed = rest.copy(), _CLOSED * max(1.0, np.abs(turned).max())
+    while (sizes := np.linalg.norm(rest, axis=0)).max() > closed:
+        # of equal columns, as of splines, the first one: parameters mean the same on any machine
+        columns.append(int((sizes > (1 - _CLOSED) * sizes.max()).argmax()))
+        direction = rest[:, columns[-1]] / sizes[columns[-1]]
+        rest = rest - np.outer(direction, direction @ rest)
+    if not columns:
         raise ProblemError(f"the class {name} has no gait of symmetry {kind.symmetry!r} but rest.")
-    return allowed @ symmetric[:, np.sort(order[:rank])]
+    return allowed @ symmetric[:, np.sort(columns)]
