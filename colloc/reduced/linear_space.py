@@ -51,9 +51,6 @@ class LinearSpace(SearchSpace):
         if not self._gaits.linear:
             self.own = np.delete(self.own, slice(self._gaits.n_wave, lower.size - self._n_static))
         self.lower, self.upper = lower[self.own], upper[self.own]
-        self._peaks = keep_last(
-            lambda v: near_peaks(self._gaits, self._table(v), self.mesh, self.checks, self._limit)
-        )
         self._at_worst = keep_last(self._constraints)
 
     def shape(self, v: np.ndarray) -> np.ndarray:
@@ -121,14 +118,14 @@ class LinearSpace(SearchSpace):
         matrix = self._matrix.reshape(-1, self._matrix.shape[2])
         return self.shape_vjp(v, on_shape.reshape(len(on_shape), -1) @ matrix)
 
-    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
+    def constraints(self, v: np.ndarray, later: float = 0.0, reach: float = 0.0) -> Constraints:
         """Shape constraints at their worst instants in cells where they might bind, then the square
         of the shape speed."""
-        return self._constraints(v, later) if later else self._at_worst(v)
+        return self._constraints(v, later, reach) if later or reach else self._at_worst(v)
 
-    def _constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
-        gaits, checks, mesh = self._gaits, self.checks, self.mesh
-        which, cells, times = self._peaks(v)
+    def _constraints(self, v: np.ndarray, later: float = 0.0, reach: float = 0.0) -> Constraints:
+        gaits, checks, mesh, table = self._gaits, self.checks, self.mesh, self._table(v)
+        which, cells, times = near_peaks(gaits, table, mesh, checks, self._limit, reach)
         times = times + later * mesh.h[cells]
         shapes = checks.shapes(gaits, self._table(v), which, times)
         placed = Placed(checks, which, cells, times, checks.shares(which, shapes))

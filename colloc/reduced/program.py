@@ -121,7 +121,7 @@ class SearchSpace:
         ``(k, n_joint, n_point)``."""
         return np.empty((len(on_points), 0))
 
-    def constraints(self, v: np.ndarray, later: float = 0.0) -> Constraints:
+    def constraints(self, v: np.ndarray, later: float = 0.0, reach: float = 0.0) -> Constraints:
         """Path constraints at the worst instants of v, or later by a part of the mesh cell."""
         none = np.empty((0, 0))
         return Constraints({}, _EMPTY, _EMPTY, -np.inf, lambda v: _EMPTY, lambda v: none)
@@ -250,9 +250,10 @@ class ReducedProgram:
         rows = [formula(name, (name,)) for name in self._held]
         return [aims.objective.formula, *rows, *(aim.formula for aim, _ in aims.at_least)]
 
-    def place_rows(self, v: np.ndarray) -> float:
-        """Move all rows to the worst instants of v; return how far it exceeds any bound."""
-        excess = self.move_checks(v)
+    def place_rows(self, v: np.ndarray, reach: float = 0.0) -> float:
+        """Move all rows to the worst instants of v, with those that bind after changes of `reach`;
+        return how far it exceeds any bound."""
+        excess = self.move_checks(v, reach=reach)
         return excess if not self.actuators else max(excess, self.actuators.place(v, self.delta))
 
     @property
@@ -276,10 +277,10 @@ class ReducedProgram:
         kinds = self.constraints.kinds.items()
         return own + [(kind, int(cell)) for kind, cells in kinds for cell in cells]
 
-    def move_checks(self, v: np.ndarray, later: float = 0.0) -> float:
+    def move_checks(self, v: np.ndarray, later: float = 0.0, reach: float = 0.0) -> float:
         """Move the path constraints to the worst instants of v, or later by a part of a mesh cell;
         return the excess."""
-        self.constraints = self.space.constraints(v, later)
+        self.constraints = self.space.constraints(v, later, reach)
         return self.constraints.excess
 
     def follow_worst(self) -> None:

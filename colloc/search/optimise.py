@@ -45,7 +45,7 @@ def solve_subproblems(
 ) -> tuple[np.ndarray, Stationarity, int, np.ndarray | None]:
     """Minimise from v ``(n,)``, updating the active instants, until nothing changes; with the
     number of iterations, and the Hessian if it is known."""
-    iterations, violation, ends = 0, np.inf, [v]
+    iterations, violation, ends, reach = 0, np.inf, [v], 0.0
     program.place_rows(v)
     for done in range(max(4, max_rounds(kkt))):
         if done >= max_rounds(kkt) and violation <= COARSE:
@@ -56,7 +56,7 @@ def solve_subproblems(
             program.follow_worst()
         result = minimize(program, v, OPTIONS.radius, objective_accuracy(kkt), curvature=hessian)
         v, iterations = result.v, iterations + result.iterations
-        admissible = program.place_rows(v) <= TOLERANCES.violation
+        admissible = program.place_rows(v, reach) <= TOLERANCES.violation
         conditions = stationarity(program, v)
         stationary = conditions.kkt_error < kkt
         # an estimate from across kinks may end the search too early
@@ -67,7 +67,12 @@ def solve_subproblems(
             break
         stalled = abs(violation - violation_before) < OPTIONS.stalled * violation_before
         if violation > MEDIUM and stalled and not result.on_edge:
-            break  # the constraints are infeasible near here
+            if reach:
+                break  # the constraints are infeasible near here
+            reach = (
+                step  # rounds may go to and fro, each beyond limits that the other has no row of
+            )
+            program.place_rows(v, reach)
         ends.append(v)
         # the first round, with instants fixed, may leave an optimum that the second comes back to
         if len(ends) > 3 and np.abs(v - ends[-3]).max() < OPTIONS.stalled * step:

@@ -189,10 +189,10 @@ shape_checks = lru_cache(maxsize=64)(ShapeChecks)
 
 
 def near_peaks(
-    gaits: Any, table: np.ndarray, mesh: Mesh, checks: ShapeChecks, limit: Limit
+    gaits: Any, table: np.ndarray, mesh: Mesh, checks: ShapeChecks, limit: Limit, reach: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Checks, cells in which each might bind soon for the gait of a class with a table, and its
-    worst instants there, ``(n,)`` each."""
+    """Checks, cells in which each might bind soon, or by changes of `reach`, for the gait of a
+    class with a table, and its worst instants there, ``(n,)`` each."""
     lower, upper = checks.bounds(limit)
 
     def excess(which, values):
@@ -215,7 +215,7 @@ def near_peaks(
     around = np.full((every.size, mesh.n + 2), -np.inf)
     around[:, 1:-1] = most
     peak = (most >= around[:, :-2]) & (most >= around[:, 2:])
-    which, cells = np.nonzero((most > -_NEAR) | (peak & (most > -_FAR)))
+    which, cells = np.nonzero((most > -max(_NEAR, reach)) | (peak & (most > -_FAR)))
 
     def at_times(t):
         of, values = np.repeat(which, t.shape[1]), np.empty(t.size)
@@ -291,7 +291,7 @@ class ShapeLimits:
         gaits, body, self._limit, speeds, *_ = control.admissible
         n_joint, table = body.n_joint, gaits.table(parameters, body.n_joint)
         checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
-        which, cells, times = near_peaks(gaits, table, mesh, checks, self._limit)
+        which, cells, times = near_peaks(gaits, table, mesh, checks, self._limit, 0.0)
         shares = checks.shares(which, checks.shapes(gaits, table, which, times))
         self._placed = placed = Placed(checks, which, cells, times, shares)
         self._gaits, self._p = gaits, layout.parameters[:, 0]

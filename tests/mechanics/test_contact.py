@@ -90,7 +90,7 @@ def corner_peak(gait):
     problem = Problem(name="corner", guess=AROUND_THE_CORNER)
     checks = shape_checks(problem.body)
     mesh = control_problem(problem).mesh()
-    which, _, times = near_peaks(Harmonic(1), gait.table, mesh, checks, np.pi)
+    which, _, times = near_peaks(Harmonic(1), gait.table, mesh, checks, np.pi, 0.0)
     mine = which == checks.names.index("links 1 and 3 (left)")
     values = checks.values(which[mine], gait.angles(times[mine]))
     return checks, which[mine][:1], times[mine][[np.argmax(values)]], values.max()

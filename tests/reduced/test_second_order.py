@@ -51,7 +51,7 @@ class Touching:
     def row_slopes(self, v):
         return self.normal
 
-    def move_checks(self, v, later=0.0):
+    def move_checks(self, v, later=0.0, reach=0.0):
         t = np.arctan2(v[1], v[0]) + later
         self.normal = np.array([[np.cos(t), np.sin(t)]])
 
