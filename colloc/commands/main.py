@@ -202,7 +202,7 @@ def option(
 
 
 def in_units(name: str, help: str = "", **more: Any) -> Option:
-    """The option of a positive number, which may end in a unit; else it is in the first."""
+    """Option of a positive number, which may end in a unit; else it is in the first."""
     units, metavar, what = _IN_UNITS[name]
 
     def read(text):
@@ -448,7 +448,6 @@ def naming_saved_files(saved: Sequence[str]) -> Iterator[None]:
 
 
 def _spell_out(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Print characters that the output's encoding lacks as words, or escaped."""
     assert isinstance(error, UnicodeEncodeError)
     words = (
         _IN_WORDS.get(c) or c.encode("ascii", "backslashreplace").decode()

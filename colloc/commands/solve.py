@@ -149,7 +149,6 @@ def _stated(values: dict[str, Any]) -> str:
 
 
 def _known(model: Model | None) -> dict[str, Any]:
-    """Arguments of a `Robot` that its file states."""
     if model is None:
         return {}
     whole = {"length": [math.fsum(model.lengths)], "mass": [math.fsum(model.masses)]}
@@ -159,7 +158,6 @@ def _known(model: Model | None) -> dict[str, Any]:
 
 
 def _stated_robot(options: argparse.Namespace, model: Model | None) -> dict[str, Any]:
-    """Arguments of a `Robot`; none if no option speaks of it."""
     robot = {name: x for name in _OF_A_ROBOT if (x := getattr(options, name)) is not None}
     if not robot:
         return {}

@@ -103,7 +103,6 @@ class Corners(GaitFunction):
 
     @property
     def _along(self) -> np.ndarray:
-        """Length of the path up to each vertex [rad]."""
         return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self.vertices), axis=0)))
 
     @property
@@ -376,7 +375,6 @@ class Polygon(Splines):
 
 
 def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
-    """Indices of ``pieces + 1`` points whose chords are nearest to all (dynamic programming)."""
     n = points.shape[1]
     cost, before = np.full((n, n), np.inf), np.triu(np.ones((n, n)), 1)
     for i in range(n - 1):
@@ -466,7 +464,6 @@ class Basis(LinearClass):
 
     @cached_property
     def _spline(self) -> tuple[Any, float, int]:
-        """A spline through the columns, its relative error, and the number of harmonics."""
         from scipy.interpolate import make_interp_spline
 
         values = np.array(self.columns)

@@ -133,7 +133,6 @@ class Coupled(LinearClass):
         return np.tensordot(joints.matrix, tables, 1).reshape(-1, motors.shape[1])
 
     def _motors(self, gait: Any) -> Any:
-        """The gait of the motors that is nearest to one of the joints."""
         joints = self.joint_map(gait.n_joint)
         if getattr(gait, "basis", None) == self:
             return self.gait.member(self.project(gait), joints.n_motor)

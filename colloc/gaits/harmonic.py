@@ -235,7 +235,7 @@ class Harmonic(LinearClass):
         return Fourier.from_table(table)
 
     def parameters(self, gait: Fourier) -> np.ndarray:
-        """Of the member nearest to a series, after shifting its start phase if that is free."""
+        """Parameters of the nearest member, after shifting the start phase if that is free."""
         gait = gait.resize(self.harmonics)
         if self.symmetry != BILATERAL:
             gait = shift_phase(gait, np.arctan2(gait.sin[0, 0], gait.cos[0, 0]) / (2 * np.pi))
@@ -435,7 +435,7 @@ class Serpenoid(Harmonic):
         return SerpenoidSeries.from_table(table, float(parameters[0]))
 
     def parameters(self, gait: Fourier) -> np.ndarray:
-        """Of the wave nearest to a series, after shifting its start phase if that is free."""
+        """Parameters of the nearest wave, after shifting the start phase if that is free."""
         lag, start = self._lag_and_start(gait)
         gait = gait.resize(self.harmonics)
         if abs(start) > SAME_START:

@@ -147,7 +147,6 @@ def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dic
 
 
 def _scale(stated: Any, by: float) -> Any:
-    """Scale a limit: a number, one for each joint, or a least and a largest angle of each."""
     if isinstance(stated, tuple):
         return tuple(_scale(each, by) for each in stated)
     return stated * (1 + by)
@@ -175,7 +174,6 @@ def _change_friction_of_feet(
 
 
 def _change_shares(shares: Sequence[float], which: Sequence[int], by: float) -> tuple[float, ...]:
-    """Scale some parts of 1, the others in proportion."""
     whole = sum(shares[k] for k in which)
     factor = (1 - whole * (1 + by)) / (1 - whole)
     return tuple(share * (1 + by if k in which else factor) for k, share in enumerate(shares))

@@ -348,7 +348,6 @@ def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, s
 def _rows(
     path: Path, table: Table, time: np.ndarray, clock: list[Column], joints: list[Column]
 ) -> tuple[np.ndarray, list[str]]:
-    """Numbers of the rows that are samples, and notes on the others."""
     needed = [c.at for c in (*clock[:1], *joints)]
     together = np.vstack([time, table.values[:, needed[-len(joints) :]].T])
     whole = np.isfinite(together).all(axis=0)
@@ -373,7 +372,6 @@ def _rows(
 
 
 def _even_steps(time: np.ndarray, raw: np.ndarray) -> tuple[np.ndarray, str]:
-    """Undo the rounding of equal steps of time, and say so."""
     steps = np.diff(time)
     unit = steps[steps > 0].min()
     whole = np.round(steps / unit)

@@ -77,7 +77,7 @@ class _Part:
     """Middle, half axes as columns, and the norm that tells how far they reach: 1 of a box."""
 
     def reach(self, way: np.ndarray) -> list[float]:
-        """How far each solid reaches that way."""
+        """Reach of each solid that way."""
         return [float(x @ way + np.linalg.norm(way @ axes, n)) for x, axes, n in self.solids]
 
 
@@ -105,7 +105,6 @@ def _first(root: Element, tags: str) -> str:
 
 
 def _row(element: Element | None, name: str, default: str, of: str) -> np.ndarray:
-    """The numbers of an attribute, as many as `default` has, if it has."""
     text = default if element is None else element.get(name, default)
     try:
         row = np.array(text.split(), dtype=float)

@@ -360,7 +360,6 @@ def _law_of(fits: list[np.ndarray], v_s: float, scale: float) -> Friction | OwnL
 
 
 def _read_table(table: Any) -> tuple[str, np.ndarray]:
-    """The source, and speed, along, across and, where it differs, back ``(n, 3 or 4)``."""
     name, names = "the table of friction", list[str]()
     if isinstance(table, (str, os.PathLike)):
         name = str(table)
@@ -407,13 +406,11 @@ def _check(name: str, speed: np.ndarray, coefficients: np.ndarray) -> None:
 
 
 def _basis(speed: np.ndarray, v_s: float) -> np.ndarray:
-    """The terms at speeds, ``(n, 4)``."""
     falls = np.exp(-speed / v_s)
     return np.stack([np.ones_like(speed), falls, 1 - falls, speed], axis=1)
 
 
 def _fit_direction(speed: np.ndarray, mu: np.ndarray, v_s: float) -> tuple[float, np.ndarray]:
-    """The best criterion, and the coefficients of the terms ``(4,)``."""
     best, coefficients, basis = np.inf, np.zeros(4), _basis(speed, v_s)
     for terms in map(list, _SETS):
         numbers = len(terms) + (1 in terms or 2 in terms)  # with v_S
@@ -430,8 +427,6 @@ def _fit_direction(speed: np.ndarray, mu: np.ndarray, v_s: float) -> tuple[float
 
 
 def _fit_all(speed: np.ndarray, coefficients: np.ndarray) -> tuple[float, list[np.ndarray]]:
-    """The best v_S, and the coefficients of the terms in all directions."""
-
     def score(log_speed):
         return sum(_fit_direction(speed, mu, np.exp(log_speed))[0] for mu in coefficients)
 

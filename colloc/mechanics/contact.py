@@ -214,7 +214,6 @@ def lacking_width(body: Any, end: int, link: int) -> Contact:
 
 
 def _outside(xp: Any, along: Array, length: Array) -> Array:
-    """What lies outside of [0, length]."""
     return 0.5 * (along - xp.abs(along)) + 0.5 * (along - length + xp.abs(along - length))
 
 
@@ -326,14 +325,12 @@ def _length(vectors: np.ndarray) -> np.ndarray:
 
 
 def _crossing(ends: np.ndarray, pairs: Sequence[Pair]) -> np.ndarray:
-    """Depths of pairs ``(n_pair, n_time)``."""
     heights, _ = _seen_ends(ends, pairs)
     crossing = (heights[0] * heights[1] < 0) & (heights[2] * heights[3] < 0)
     return np.where(crossing, np.abs(heights).min(axis=0), 0.0)
 
 
 def _gaps(ends: np.ndarray, ends_links: Sequence[Pair] | np.ndarray) -> np.ndarray:
-    """Distances of ends from links ``(k, n_time)``."""
     end, link = _columns(ends_links)
     along, to = ends[:, link + 1] - ends[:, link], ends[:, end] - ends[:, link]
     part = np.clip((along * to).sum(axis=0) / (along * along).sum(axis=0), 0.0, 1.0)

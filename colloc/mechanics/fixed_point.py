@@ -151,7 +151,6 @@ def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
 def _search(
     moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
 ) -> Found:
-    """Attempts from one initial guess after another, until all time points converge."""
     found = _attempt(moving, start, tolerance, max_iterations, "direct")
     enough, contact = _reachable(moving, tolerance), moving.body.contact
 

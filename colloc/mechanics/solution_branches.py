@@ -157,7 +157,6 @@ def _between_and_beside(moving: Moving, z: np.ndarray) -> np.ndarray:
 
 
 def _distinct(z: np.ndarray, sign: np.ndarray, speed: np.ndarray) -> Branches:
-    """Solutions without repetitions, in their order, and no longer than needed."""
     z = np.where(sign[:, None] == 0, np.nan, z)
     again = _repeat(z, speed)
     z, sign = np.where(again[:, None], np.nan, z), np.where(again, 0.0, sign)
@@ -182,7 +181,6 @@ def _repeat(z: np.ndarray, speed: np.ndarray) -> np.ndarray:
 def _replace(
     everywhere: Branches, part: Moving, chosen: np.ndarray, z: np.ndarray, sign: np.ndarray
 ) -> Branches:
-    """Branches with distinct ones of these at the chosen time points, `part`."""
     there = _distinct(z, sign, _largest_rate(part.rates))
     more = max(0, len(there.z) - len(everywhere.z))
     z = np.pad(everywhere.z, ((0, more), (0, 0), (0, 0)), constant_values=np.nan)
@@ -268,7 +266,6 @@ def _order(several: np.ndarray, sense: int) -> Iterator[tuple[int, int]]:
 
 
 def _nearest(z: np.ndarray, sign: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Solution nearest to a velocity ``(3,)``, among the stable ones if there are any."""
     distance = np.abs(z - before[:, None].T).max(axis=1)
     stable = np.where(sign > 0, distance, np.inf)
     return z[np.nanargmin(stable if np.isfinite(stable).any() else distance)]

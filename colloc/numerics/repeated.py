@@ -194,12 +194,10 @@ class Nlp:
         return [at_instances(*both) for both in zip(functions, columns, strict=True)]
 
     def _values_at(self, at: np.ndarray) -> np.ndarray:
-        """Objective and rows, ``(1 + m,)``, at ``(x, delta)``."""
         outputs = self._of_instances(_VALUES, self._columns(at))
         return self._every @ np.concatenate([at[:-1], *outputs, [1.0]])
 
     def _slopes_at(self, at: np.ndarray) -> tuple[np.ndarray, sparse.csc_matrix]:
-        """Gradient of the objective ``(n,)`` and Jacobian of the rows ``(m, n)``."""
         slopes = np.concatenate([*self._of_instances(_SLOPES, self._columns(at)), [1.0]])
         parts = self._on_slopes @ slopes, self._whole.indices, self._whole.indptr
         whole = sparse.csc_matrix(parts, shape=self._whole.shape)

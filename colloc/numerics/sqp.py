@@ -288,7 +288,6 @@ def minimize(
 def _box(
     program: NonlinearProgram, v: np.ndarray, radius: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Its centre, lower and upper ends."""
     v = np.clip(v, program.lower, program.upper)
     return v, np.maximum(program.lower, v - radius), np.minimum(program.upper, v + radius)
 
@@ -304,7 +303,6 @@ def is_on_edge(program: NonlinearProgram, start: np.ndarray, radius: float, v: n
 def _line_search(
     program: NonlinearProgram, here: _Point, d: np.ndarray, price: np.ndarray, model: float
 ) -> _Point | None:
-    """First point along a step with a tenth of the model's decrease, if there is one."""
     merit, size = here.objective + price @ here.outside, 1.0
     for _ in range(_MOST_TRIALS):
         there = _Point.at(program, here.v + size * d)
@@ -316,7 +314,6 @@ def _line_search(
 
 
 def _bfgs(b: np.ndarray, s: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Damped BFGS update for a step s that changed the Lagrangian's gradient by y."""
     bs = b @ s
     sbs, sy = s @ bs, s @ y
     if not np.isfinite(sy) or sbs <= 0:

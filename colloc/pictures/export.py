@@ -466,7 +466,6 @@ MODELS = {".xml": mjcf, ".urdf": urdf}
 
 
 def _in_mujoco(law: Law) -> Law:
-    """The law in MuJoCo that is nearest to a dry one."""
     dry = isinstance(law, Friction) and law.associated and law.reversible
     if dry or isinstance(law, Axle):
         return law

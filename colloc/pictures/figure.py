@@ -310,7 +310,6 @@ class _Ticks(MaxNLocator):
 
 
 def _label_in(size: float, *axes: Any) -> None:
-    """Label axes in a unit of which there are `size` in the data's."""
     for axis in axes if size != 1.0 else ():
         axis.set_major_locator(_Ticks(size))
         axis.set_major_formatter(lambda x, _: f"{round(size * x, 9):g}".replace("-", "−"))
@@ -413,7 +412,6 @@ def _draw_power(axes: Axes, solution: Solution) -> None:
 
 
 def _draw_convergence(axes: Axes, solution: Solution) -> None:
-    """Objective against delta at every step of the search; crosses did not converge."""
     steps = [(step.delta, step.value, step.optimal) for step in solution.history]
     deltas, values, good = np.array(steps).T
     good = good > 0
@@ -549,7 +547,6 @@ def _set_log(axes: Axes, which: str, limits: tuple[float, float]) -> None:
 def _draw_series(
     axes: Axes, t: np.ndarray, rows: np.ndarray, of: str, xlabel: str, ylabel: str
 ) -> None:
-    """A line for every joint or part; many are coloured from dark to light, and a few named."""
     count = len(rows)
     many = count > len(SERIES)
     colours = colormaps[SEQUENTIAL](np.linspace(0.0, 0.9, count)) if many else SERIES

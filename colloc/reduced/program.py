@@ -158,12 +158,10 @@ class ActuatorRows:
         return excess if excess > _EXACT or np.isnan(excess) else 0.0
 
     def _sizes(self, v: np.ndarray, delta: float, t: np.ndarray) -> np.ndarray:
-        """Sizes of shares ``(n_share, *t.shape)`` at times t."""
         shares = self._motion.shares(self._limits, v, delta, t.ravel())
         return self._limits.sizes(shares).reshape(-1, *t.shape)
 
     def _largest(self, v: np.ndarray, delta: float) -> np.ndarray:
-        """Largest shares in every interval, ``(n_share, n)``."""
         mesh = self._motion.mesh
         t = mesh.edges[:-1, None] + mesh.h[:, None] * _INSIDE
         found = self._sizes(v, delta, t)

@@ -115,7 +115,6 @@ class Solver:
     def _values_and_slopes(
         self, x: np.ndarray, delta: float
     ) -> tuple[float, np.ndarray, np.ndarray, sparse.csc_matrix]:
-        """Objective, gradient ``(n,)``, rows ``(m,)`` and Jacobian ``(m, n)``."""
         at = np.append(x, delta / self.program.delta_unit)
         (f, *_), g = np.split(self._nlp.values(at), [1])
         gradient, jacobian = self._nlp.slopes(at)
@@ -166,8 +165,6 @@ class Solver:
     def _complete(
         self, x: np.ndarray, delta: float, lam_x: np.ndarray, lam_g: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Multipliers of bounds and rows: those of the equations minimise the Lagrangian's
-        gradient."""
         t = self.program
         _, gradient, _, slopes = self._values_and_slopes(x, delta)
         lam_g = np.where(t.row_lower == t.row_upper, 0.0, lam_g)

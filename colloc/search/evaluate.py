@@ -588,7 +588,7 @@ class _Fit:
         return np.where(self.seen, [at * turn / max(abs(turn), 1e-300) - measured, angles], 0)
 
     def rms(self, off: np.ndarray) -> float:
-        """Of places, or of headings if there are none."""
+        """Root mean square of places, or of headings if there are none."""
         which = int(not self.seen[0].any())
         return math.sqrt((np.abs(off[which]) ** 2).sum() / self.seen[which].sum())
 

@@ -183,7 +183,6 @@ def with_reachable_distance(problem: Problem) -> tuple[Problem, list[AnyGait]]:
 
 
 def _guess_goes(problem: Problem, distance: float) -> bool:
-    """True if the guess keeps all limits and goes so far: then many gaits do."""
     with suppress(CollocError):
         here = evaluate_at(*space_near(problem, problem.guess), problem.delta)
         return here.violation <= COARSE and here.step.distance >= distance
@@ -555,7 +554,6 @@ def small_loops(problem: Problem) -> list[AnyGait]:
 
 
 def _shapes(problem: Problem) -> np.ndarray:
-    """Distinct admissible mean shapes ``(n_joint, n)`` of gaits of the class."""
     body, limit, seeds = problem.body, problem.joint_limit, problem.gait.start_class
     n_joint = body.n_joint
     levels, rng = np.linspace(-1.0, 1.0, 5), np.random.default_rng(2)

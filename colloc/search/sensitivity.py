@@ -200,7 +200,6 @@ def _lagrangian(space: SearchSpace, v: np.ndarray, delta: float) -> Callable[[Pr
 
 
 def _neighbours(parameter: Parameter, step: float) -> dict[int, Problem]:
-    """Problems with a number a little smaller (-1) and larger (1), where that is possible."""
     changed = {}
     for side in (-1, 1):
         with suppress(ProblemError):
@@ -214,7 +213,6 @@ def _slope(
     sides: tuple[int, ...],
     step: float = _STEP,
 ) -> float:
-    """Central difference, or a one-sided one where the number can change to one side only."""
     if len(sides) == 2:
         return (value(parameter.changed(step)) - value(parameter.changed(-step))) / (2 * step)
     (side,) = sides

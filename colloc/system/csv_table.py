@@ -92,7 +92,6 @@ def read_table(path: Path) -> Table:
 
 
 def _first_row(rows: list[_Row], width: int, usual: list[list[str]]) -> int:
-    """Index of the first row with numbers in the columns where most rows have some."""
     columns = zip(*usual, strict=True)
     numeric = [j for j, x in enumerate(columns) if 2 * sum(map(_is_number, x)) >= len(usual)]
 
@@ -174,7 +173,6 @@ def _is_number(cell: str) -> bool:
 
 
 def _number(cell: str) -> float:
-    """Parse a number with a decimal point or comma; NaN if it is not finite."""
     try:
         number = float(cell)
     except ValueError:
@@ -189,7 +187,6 @@ def _number(cell: str) -> float:
 
 
 def _names(path: Path, rows: list[_Row], width: int) -> tuple[list[str], list[str]]:
-    """Column names and units from the lines before the first row of numbers."""
     plain = [row for row in rows if not row.comment]
     fitting = [row.cells for row in plain if len(row.cells) == width]
     if rows and not fitting and len(rows[-1].cells) == width > 1:

@@ -285,7 +285,6 @@ class FullProgram(Program):
         self.change = self.repeat(change, [tail, layout.centre, *self._momenta_and_pace()])
 
     def _contact(self, group: Any) -> np.ndarray:
-        """Force in the plane, moment and power of parts under one law."""
         layout, contact, law, rows = self.layout, self.chain.contact, group.law, group.rows
         links, n_part = np.array(contact.links)[rows], len(contact.parts)
         moving = [layout.directions, layout.spins, layout.vx, layout.vy, layout.x, layout.y]
@@ -331,7 +330,6 @@ class FullProgram(Program):
         return [self.layout.momenta[:, self.sites], paces]
 
     def _froude(self, pace: ca.SX) -> Any:
-        """Froude number for time in radians."""
         return (ca.exp(-2.0 * pace) if pace.size1() else self.dynamics.regime.froude) * RADIANS**2
 
     def _function_of_body(self) -> None:
@@ -344,7 +342,6 @@ class FullProgram(Program):
         self.point = self.add_repeated(Repeated(function, gather, values, self.velocity))
 
     def _at_points(self, formula: Any) -> np.ndarray:
-        """Values at every point, ``(n_value, n_point)``."""
         variables, shape = self._shape(formula.needs_forces)
 
         def value(*local):
@@ -471,7 +468,6 @@ class FullProgram(Program):
         self.add("orientation", rows, even, even)
 
     def _ways(self) -> tuple[Any, Any, Any]:
-        """Rows of the velocities ahead and across, and of the power."""
         if self.layout.z.size:
             return tuple(self.pick(self.point[k]) for k in (3, 4, 5))
         mass, angle = self._spread(self.chain.mass_column().T), self.dynamics.regime.ahead
@@ -515,7 +511,6 @@ class FullProgram(Program):
 
 
 def _lengths_of_sides(shares: np.ndarray, rates: np.ndarray, p: ca.SX) -> ca.SX:
-    """Length of every side of a polygon over that of all."""
     sides = zip(shares, rates, strict=True)
     lengths = ca.vertcat(*(share * ca.norm_2(ca.DM(each) @ p) for share, each in sides))
     return lengths / ca.sum1(lengths)

@@ -125,7 +125,6 @@ class FineMotion:
         return self.edges[:-1, None] + np.diff(self.edges)[:, None] * PANEL_RULE.c
 
     def _locate(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Panels of phases, fractions of these, and their lengths."""
         k = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, self.edges.size - 2)
         h = self.edges[k + 1] - self.edges[k]
         return k, (t - self.edges[k]) / h, h

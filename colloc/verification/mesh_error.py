@@ -473,7 +473,6 @@ def plan_mesh(
 
 
 def _by_error(shares: np.ndarray, wanted: float) -> tuple[np.ndarray, int]:
-    """Intervals by falling error, and how many of them hold most of the excess."""
     order = np.argsort(shares)[::-1]
     return order, int((np.cumsum(shares[order]) < shares.sum() - 0.3 * wanted).sum())
 
@@ -515,7 +514,6 @@ def _split(
 def _halve(
     known: Known, rule: Scheme, edges: np.ndarray, *, wanted: float, budget: float
 ) -> tuple[np.ndarray, float]:
-    """Halve the intervals with the largest errors of a motion with states."""
     control, gait, delta, fine = known
     while True:
         error = mesh_error(control, Mesh(rule, edges), gait, delta, fine=fine)
