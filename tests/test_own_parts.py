@@ -163,8 +163,7 @@ def test_a_limit_of_your_own_is_kept_certified_stored_and_read(tmp_path):
 
 @pytest.mark.slow
 def test_limits_stated_anew_are_those_that_are_known():
-    """A torque as a row of the same program; a speed as rows of it, which the library keeps at the
-    gait's fastest instants."""
+    """A torque as a row; a speed as rows, at the gait's fastest instants in the library."""
     mine = WEAK.with_(torque_limit=None, limits=[PathLimit("torque", "moment", 0.053)])
     assert solve(mine, starts=1).value == solve(WEAK, starts=1).value
     fast = WEAK.with_(torque_limit=None, speed_limit=9.0)

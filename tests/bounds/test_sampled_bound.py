@@ -215,8 +215,7 @@ def test_minimax_program_agrees_with_a_simplex_solver():
 
 @pytest.mark.parametrize("n_joint", [2, 3])
 def test_roughness_is_the_integral_of_squared_second_derivatives(n_joint):
-    """f = x^2 y on [-a, a]^n, interpolated exactly by cubic splines: |D^2 f|^2, 4 y^2 + 8 x^2,
-    gives 16 a^4 (2 a)^(n-2)."""
+    """Of f = x^2 y on [-a, a]^n by cubic splines: 4 y^2 + 8 x^2 gives 16 a^4 (2 a)^(n-2)."""
     a = 1.3
     spline = TensorSpline(n_joint, a, 4)
     q = np.random.default_rng(16).uniform(-a, a, (n_joint, 800))

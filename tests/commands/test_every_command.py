@@ -80,7 +80,7 @@ animate good.h5 --format mp4 --output x.gif -> x.gif should end in .mp4
 export | nope.h5 | text.h5 | good.h5 | good.h5 --period 4 --rate nan | good.h5 --period 4 --mass 1
 export | good.h5 --period 4 --max-speed 0 | good.h5 --period 4 --max-speed 1 2 3 | good.h5 --period 4 --periods 0
 export good.h5 --format x -> --format must be one of 'csv', 'json', 'pulses', 'ros', 'c', 'mjcf', 'urdf', not 'x'
-export good.h5 --format urdf -> needs the period [s], the length [m] and the mass [kg]
+export good.h5 --format urdf -> state the robot's length [m], mass [kg] and period [s]
 export good.h5 --length 1 --mass 3 --period 5 --format urdf --max-speed 2 -> holds no motion: leave max_speed out
 export good.h5 --period 4 --output x.xlsx -> x.xlsx should end in .csv or .json
 export good.h5 --period 4 --format ros --degrees -> degrees are for angles in CSV and JSON

@@ -101,8 +101,7 @@ def test_where_rates_have_no_slope_there_is_no_motion_and_no_derivative():
 
 
 def test_a_slow_motion_down_a_steep_slope_is_found_where_steps_run_out_of_what_balances():
-    """Links that hardly slip sideways: from such a begin of theta, judging a step by the next one
-    ends without a motion, as no rate is known there."""
+    """Judged by the next one, steps end without a motion, as no rate is known there."""
     mesh, body = Mesh(scheme("gauss-3"), np.linspace(0.0, 1.0, 21)), Chain()
     cos, sin = [[0.5, 1.3], [1.3, 1.4]], [[0.4, -0.3], [0.6, 0.6]]
     shapes = Shapes(*Fourier([-0.9, -1.1], cos, sin)(mesh.times), 0.03)

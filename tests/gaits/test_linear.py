@@ -169,15 +169,18 @@ def test_four_primitives_are_solved_kept_read_and_played(tmp_path):
 
 @pytest.mark.slow
 def test_many_knots_do_as_well_as_the_harmonics_that_they_begin_at():
-    """More numbers of either kind make sharper features. Both classes have several optima, so the
-    splines begin at the best gait of the harmonics: 0.4053, and 0.4069 from there. Rounding
-    chooses among those, too: 0.4039 was seen, and 0.4018 from there, so they agree to 1 %."""
+    """Rounding chooses among several optima, 0.4018 to 0.4069, so they agree to 1 %."""
     waves = colloc.solve(Problem("waves", gait=Harmonic(8, "bilateral")))
     problem = Problem("splines", gait=BSpline(24, symmetry="bilateral"), guess=waves.gait)
     splines = colloc.solve(problem, 1)
     assert splines.status == waves.status == "solved"
     assert splines.value > (1 - 1e-2) * waves.value
     assert splines.value == pytest.approx(waves.value, rel=1e-2)
+
+
+def test_parameters_of_a_symmetric_spline_are_those_of_the_first_joint_on_any_machine():
+    table = BSpline(6, symmetry="bilateral").member(np.arange(6.0), 2).table
+    np.testing.assert_allclose(table[0], np.arange(6.0), atol=1e-12)
 
 
 @pytest.mark.slow
@@ -194,8 +197,7 @@ def rough(t):
     ("column", "least", "most"), [(bump, 1.0, (10, 1.5, 1.2)), (rough, 0.3, (4, 4, 4))]
 )
 def test_interpolation_states_its_error(column, least, most):
-    """Well where steps are small; of few samples it is too large, as their error has not yet come
-    to fall fast. Of a rough one it is known to a factor."""
+    """Well where steps are small, too large of few samples, to a factor of a rough one."""
     for n, factor in zip((24, 48, 96), most, strict=True):
         basis, t = Basis([column(np.arange(n) / n)]), np.linspace(0, 1, 5001)
         true = np.abs(basis.functions(t)[0] - column(t)).max() / column(t).max()
@@ -211,8 +213,7 @@ def test_columns_have_the_harmonics_that_hold_all_but_a_millionth_of_their_mean_
 
 
 def test_a_file_of_columns_is_read_with_or_without_its_last_line_and_by_even_steps_only(tmp_path):
-    """The last line is the first again where every column is back to a tenth of a step: the last
-    but one of the last is too."""
+    """The last line repeats the first where every column is back to a tenth of a step."""
     t, path = np.linspace(0, 3, 97), tmp_path / "columns.csv"
     columns = np.column_stack([bump(t / 3 - late) for late in (0.0, 0.25, -0.5 / 96)])
     again, known = columns.copy(), Basis(list(columns[:-1].T)).functions(T)

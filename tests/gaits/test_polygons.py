@@ -133,8 +133,7 @@ def test_delta_keeps_its_meaning_from_class_to_class():
 
 
 def test_a_pair_of_closed_joints_that_travels_along_a_folded_chain_wastes_nothing_in_the_limit():
-    """All joints are open by e but two neighbours, which are folded: W = e/5, d = W (1 - e^2/24).
-    No gait exceeds 1."""
+    """All are open by e but two neighbours: W = e/5, d = W (1 - e^2/24); none exceeds 1."""
     links = 5
     body, sign = Chain((1 / links,) * links), -((-1.0) ** np.arange(links - 1)[:, None])
     closed = [(), *((j, j + 1) for j in range(links - 2))]
@@ -181,9 +180,8 @@ def test_refinement_encloses_a_kink_instead_of_following_it():
 
 @pytest.mark.slow
 def test_a_gait_that_rests_on_a_kink_is_certified_and_said_to():
-    """Nearest to it, no gradient is below 1e-3; those of both sides cancel. Which meshes lead there
-    depends on rounding: of some thirty such starts two did not settle, and one ended on a mesh that
-    smooths the kink. Rounding may choose the optimum, too, even there: there is one of 0.4469."""
+    """Nearest to it, no gradient is below 1e-3; those of both sides cancel. Rounding
+    decides which starts settle there: two of thirty did not, and there is one of 0.4469."""
     body, friction = Chain((0.2, 0.5, 0.3)), Friction(mu_t=0.5, mu_f=1.0, mu_b=5.0)
     gait_at_kink = Fourier(
         mean=[0.296, -0.3171],

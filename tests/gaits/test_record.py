@@ -165,8 +165,7 @@ def test_the_period_of_a_record_that_holds_several_is_found(periods, noise, tmp_
 
 
 def test_where_a_period_is_told_from_a_wave_its_phase_at_the_start_is_known_half_as_well(tmp_path):
-    """The bound of Cramer and Rao (Rife & Boorstyn, 1974): a period that is off by a little turns
-    the start most."""
+    """The bound of Cramer and Rao (Rife & Boorstyn, 1974)."""
     t, rng, path = np.arange(240) / 60, np.random.default_rng(3), tmp_path / "wave.csv"
     path.write_text("t,q1\n" + table(t, np.cos(2 * np.pi * t) + 0.01 * rng.normal(size=t.size)))
     told, given = (fitted_gait(path, 1, harmonics=1, period=period) for period in (None, 1.0))

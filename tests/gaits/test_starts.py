@@ -92,8 +92,7 @@ def test_a_latin_hypercube_has_a_point_in_every_part_of_a_coordinate_and_depends
 
 @pytest.mark.parametrize("name", GAITS)
 def test_links_cut_in_two_move_as_before(name):
-    """New joints in the middles of links stay straight, old ones keep their angles; joining the
-    halves undoes it."""
+    """New joints stay straight, old ones keep their angles; joining the halves undoes it."""
     gait = GAITS[name]
     cut = to_body(gait, THREE, SIX)
     np.testing.assert_allclose(cut.angles(PHASES)[1::2], gait.angles(PHASES), rtol=0, atol=1e-12)
@@ -145,8 +144,7 @@ def test_a_gait_that_becomes_too_short_grows_about_its_mean(symmetry, gait_class
 
 @pytest.mark.slow
 def test_a_richer_class_keeps_what_its_seed_had():
-    """From 100 times the final delta, where friction is regularised most, the search leaves this
-    optimum: 0.3998."""
+    """From 100 times the final delta the search leaves this optimum: 0.3998."""
     problem = Problem("five", BEST_FIVE, gait=Harmonic(5, "bilateral"), delta=1.5e-3, intervals=60)
     near = warm_start(problem, BEST_FIVE, Harmonic(6, "bilateral"))
     from_afar = solve(near.with_(delta_start=100 * near.delta), 1)

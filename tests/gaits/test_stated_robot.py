@@ -67,8 +67,7 @@ def test_what_follows_from_the_robot_is_neither_stated_nor_saved_beside_it():
 
 
 def test_inertia_counts_from_a_thousandth_of_friction_on():
-    """A robot of 0.62 m that takes ten minutes is slow; there it changes the efficiency by less
-    than a thousandth (docs/howto/pace.md)."""
+    """A robot of 0.62 m that takes ten minutes is slow (docs/howto/pace.md)."""
     assert Problem("slow", robot=SLOW).froude == 0
     assert Problem("quick", robot=replace(SLOW, period=7.0, max_speed=None)).froude > 0
     free = Problem("free", robot=replace(SLOW, period=(5.0, 10.0), max_speed=None))

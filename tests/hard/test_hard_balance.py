@@ -108,12 +108,8 @@ def test_rates_and_delta_over_600_decades_do_not_overflow():
 
 @pytest.mark.parametrize("delta", [1e-2, 1e-6, 1e-10])
 def test_scissors_share_their_rate_equally(delta):
-    """Two equal links folded onto each other: without delta any split of the rate balances; delta
-    picks the even one.
-
-    The couple about the common end changes with the split by delta^2 only, so a residual of 1e-11
-    fixes it to 1e-11 / delta^2: at tiny delta not at all. The power does not depend on it.
-    """
+    """Folded onto each other, any split of the rate balances without delta, which picks the even one:
+    the couple about the common end changes with the split by delta^2, so 1e-11 fixes it to 1e-11 / delta^2."""
     body, angles, rates = Chain((0.5, 0.5)), np.array([[np.pi]]), np.array([[1.0]])
     z = solve_balance(body, Friction(), angles, rates, delta).require().z
     assert abs(z[2, 0] + 0.5) < min(1e-10 / delta**2, 0.5)

@@ -51,8 +51,7 @@ def test_moments_normal_force_and_couple_agree_with_graded_quadrature_over_all_r
 @pytest.mark.parametrize("w", [0.0, 5e-324, 1e-300, 1e-160, 1e-30, -1e-23])
 @pytest.mark.parametrize("delta", [1.0, 1e-6, 1e-14])
 def test_pure_translation_and_near_it(w, delta):
-    """Without rotation the integrals are those of a constant; a rotation below rounding changes
-    nothing."""
+    """Integrals are those of a constant; a rotation below rounding changes nothing."""
     for vs, vn in ((0.0, 0.0), (3.0, 4.0), (0.0, 1e-9), (1e-13, 0.0)):
         root = np.sqrt(vs**2 + vn**2 + delta**2)
         I0, I1, I2 = COULOMB.moments(*column(vs, vn, w), LENGTH, delta)

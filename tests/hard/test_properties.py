@@ -41,12 +41,9 @@ def solved(body, law, angles, rates, delta):
 
 
 def allowed(body, law, angles, rates, delta):
-    """How far two solutions with residuals below 1e-11 may lie apart: the inverse of the balance's
-    derivative tells.
-
-    It can be far: two links that turn oppositely about a common end balance at every split of the
-    rate between them, but for delta.
-    """
+    """How far two solutions with residuals below 1e-11 may lie apart, by the inverse of the
+    balance's derivative: far where two links turn oppositely about a common end, as there any
+    split of the rate between them balances."""
     z = solved(body, law, angles, rates, delta)
     now = instant(body, law, angles, rates, z, delta)
     slope = balance_jacobian(body, law, now.posture, now.velocity, np.array([[delta]]))[0]

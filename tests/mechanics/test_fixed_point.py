@@ -80,8 +80,7 @@ CASES = ["five links", "four links", "backward friction", "on three feet"]
 
 @pytest.mark.parametrize("case", BESIDE_A_FOLD, ids=CASES)
 def test_beside_a_fold_of_the_balance_the_other_solution_is_found_in_few_steps(case):
-    """Two solutions have just met and vanished: the residual has a minimum there, at which every
-    step from rest ends. The way down from a large delta takes thousands of steps: it comes last."""
+    """Two solutions have just met and vanished: every step from rest ends at a minimum."""
     body, friction, delta, angles, rates = case
     at = body, friction, np.array(angles)[:, None], np.array(rates)[:, None]
     first, found = solve_balance(*at, delta, method="direct"), solve_balance(*at, delta)

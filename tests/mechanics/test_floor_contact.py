@@ -235,8 +235,7 @@ def on_axles(**wheel):
 
 @pytest.mark.parametrize("wheel", [{"rolling": 1e-7}, {"rolling": 1.0, "sideways": 1e7}], ids=str)
 def test_wheels_that_roll_freely_or_hold_firmly_do_not_slip(wheel):
-    """To rolling over sideways friction times delta, and not times the speed: it is nonholonomic at
-    any small ratio."""
+    """To rolling over sideways friction times delta, and not times the speed."""
     body = on_axles(**wheel)
     z = colloc.solve_balance(body, Friction(), *BENT, 1e-3).require().z
     known = [wheels_that_do_not_slip(body, *at) for at in BENT.transpose(2, 0, 1)]

@@ -87,8 +87,7 @@ def test_a_bend_that_a_longer_step_does_not_see_is_no_saddle_and_an_error_is_wha
 
 
 def test_the_peak_of_a_moment_moves_with_the_gait():
-    """The second derivative of the largest moment over time is that at its instant and what the
-    move of the instant adds."""
+    """Its second derivative is that at its instant and what the instant's move adds."""
     gait, asked = Harmonic(1, "bilateral"), {"torque_limit": 0.06, "delta": 1e-2}
     problem = Problem("weak", body=Chain((0.25,) * 4), gait=gait, **asked)
     space, v = space_near(problem, problem.guess)

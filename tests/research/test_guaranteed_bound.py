@@ -285,8 +285,7 @@ def test_on_twice_the_friction_the_bound_is_half_as_large(bound, monkeypatch, ta
 
 @pytest.mark.parametrize("body", [BODY, Chain((0.4, 0.25, 0.35)), Chain((0.25, 0.3, 0.45))])
 def test_parts_share_the_cells_and_these_fill_the_domain(body, monkeypatch):
-    """Each once: half of the plane of angles but where links cross, and all rates, also where cells
-    are halved; thin ones keep their rates."""
+    """Each once, and all rates, also where cells are halved."""
     seen = []
 
     def recorded(view, friction, potential, cells, goal):
@@ -367,11 +366,8 @@ def test_without_a_compiler_it_says_what_is_wanting(potential):
 
 @pytest.mark.parametrize("delta", [1e-3, 1e-2, 1e-1])
 def test_finite_delta_costs_at_most_delta_in_dissipation_and_in_power(delta):
-    """J <= J_delta <= J + delta: regularised motions are within delta of minimal dissipation, their
-    power at most delta below.
-
-    These are all that the allowance for finite delta uses (research/guarantee/README.md).
-    """
+    """J <= J_delta <= J + delta, and power at most delta below: all that the allowance for finite
+    delta uses (research/guarantee/README.md)."""
     q, r = np.random.default_rng(35).uniform(-3, 3, (2, 2, 300))
     rest = np.zeros((3, 300))
     exact = loaded_balance(BODY, UNIT, q, r, rest, rest, 1e-10)

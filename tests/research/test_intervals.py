@@ -235,8 +235,7 @@ def test_half_way_between_headings_the_bound_of_the_gain_is_met_to_fourth_order(
 
 
 def test_the_error_of_a_trial_motion_is_that_of_interpolating_slopes_and_products(potential, cells):
-    """h^2/8 of second derivatives of the rate, and of spin times potential; (h/4) of the change of
-    one times the slope of the other."""
+    """h^2/8 of second derivatives; h/4 of a change times the other's slope."""
     motions = motions_at(cells.points)
     found = potential.trial_error(cells, motions)
     for n in range(N):
@@ -277,8 +276,7 @@ def test_a_reference_point_is_the_first_harmonic_and_all_else_is_beside_it(poten
 
 @pytest.mark.parametrize("order", [(1, 0), (0, 1), (2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
 def test_bounds_of_derivatives_are_the_hull_of_their_coefficients(potential, order):
-    """A cubic that is the same everywhere has the same derivatives everywhere: the bound is met by
-    a polynomial."""
+    """A cubic that is the same everywhere meets the bound."""
     a, b = order
     spline, space = potential.spline, potential.space
     whole = PotentialRange(space, np.zeros(space.size))

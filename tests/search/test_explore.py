@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import colloc
+from benchmarks.zoo import robot_problem
 from colloc import Chain, Foot, Friction, Harmonic, Polygon, Problem, Viscous, Wheel, load, save
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.contact import crossing_depth
@@ -17,7 +18,8 @@ from colloc.search import explore
 from colloc.search import solve as stages
 from colloc.search.checkpoint import Run
 from colloc.search.explore import multistart, small_loops
-from colloc.search.optimise import regularisation_dominated
+from colloc.search.iterate import space_near
+from colloc.search.optimise import optimise, regularisation_dominated
 from colloc.search.solve import solve
 from tests.shared.cases import slow
 
@@ -319,3 +321,12 @@ def test_a_small_gait_at_the_fold_is_found_where_it_is_the_best():
     assert -known[0].dry_objective > 0.36
     assert best.shape_speed < 2 * problem.smallest_shape_speed
     assert np.sort(np.abs(best.mean)) == pytest.approx([0, np.pi], abs=0.2)
+
+
+def test_rounds_that_go_to_and_fro_between_joint_limits_come_to_an_end():
+    """Each end broke what had a row in the other alone: this robot got no answer."""
+    tenths = "1 7 1 -5 -4 -1 11 4 7 -6 0 1 5 2 5 0 -4 12 -7 4 -1 -10 6 -5 -8"
+    table = 0.1 * np.fromstring(tenths, sep=" ").reshape(5, 5)
+    stated, begun = robot_problem(21), colloc.Fourier.from_table(table)
+    end = optimise(*space_near(stated, begun), stated.delta, 1e-3)
+    assert end.violation < 1e-3 < 0.1 < 1.5 * end.value

@@ -181,8 +181,7 @@ def test_what_is_drawn_lies_on_the_curve_and_moves_as_it_does_which_turns_as_its
 
 @pytest.mark.parametrize("body", [*PRESCRIBED[3:], CrawlerBody(0.2)], ids=str)
 def test_between_the_breaks_of_a_bump_its_curvature_does_not_jump(body):
-    """Theta'' jumps by as much as six times the square of the bump's steepness; a few points from a
-    break it is continuous."""
+    """At a break it jumps by up to six times the square of the bump's steepness."""
     (q, _, _), h = shapes(body), S[1]
     theta = body.tangent(S[:, None] * np.ones(3), q)
     jumps, breaks = np.abs(np.diff(theta, 4, axis=0)) / h**2, body.breaks(q)

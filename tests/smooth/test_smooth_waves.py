@@ -260,8 +260,7 @@ def test_the_anchor_holds_and_the_stroke_is_the_geometry(crawler):
 
 
 def test_isotropic_crawler_scales_as_the_paper_says():
-    """d ~ epsilon, W_inner ~ epsilon^2, W_outer/d -> 1, 1 - efficiency ~ epsilon; above 0.99 at
-    epsilon = 0.0025."""
+    """d ~ epsilon, W_inner ~ epsilon^2, W_outer/d -> 1, 1 - efficiency ~ epsilon."""
     epsilons = (0.01, 0.005, 0.0025)
     how = {"intervals": 1, "quadrature_tolerance": 1e-8}
     periods = [ONE.with_(epsilon=e, delta=delta_for(e)).period(**how) for e in epsilons]
