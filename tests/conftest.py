@@ -25,8 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pytest.fixture(scope="session")
 def once(tmp_path_factory):
-    """A function from (name, make) to what `make()` returns: the first worker that asks makes it,
-    the others read its file."""
+    """From (name, make) to what `make()` returns: one worker makes it, the others read its file."""
     own = tmp_path_factory.getbasetemp()
     folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "once"
     folder.mkdir(exist_ok=True)

@@ -90,8 +90,7 @@ NAMES |= {
 
 
 def cases(text, separator, most=-1):
-    """Cells of the lines of a table; alternatives in the first, of which all else holds, are lines
-    of their own."""
+    """Cells of the lines of a table; alternatives in the first are lines of their own."""
     rows = (line.split(separator, most) for line in text.strip().splitlines())
     return [(each, *rest) for first, *rest in rows for each in first.split(" | ")]
 

@@ -201,8 +201,7 @@ def test_efficiencies_are_those_of_the_curated_tables(page):
 
 
 def class_row(name):
-    """A row of the page's table of classes as the curated tables call it; both axes of a polygon
-    where the better is shown."""
+    """A row of the table of classes; of a polygon the axes of which the better is shown."""
     name = name.replace("at most", "<=")
     if name.endswith("no symmetry"):
         return [name]

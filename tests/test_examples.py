@@ -78,8 +78,7 @@ def cases():
 
 
 def last_numbers(printed):
-    """Those of the last line of what a script prints, without signs: a gait and its mirror image
-    are as good, and rounding decides which of them a search meets."""
+    """Those of the last line that a script prints, without signs: mirror images are as good."""
     line = printed.strip().splitlines()[-1]
     return [float(number) for number in re.findall(r"\d+\.\d*", line)]
 

@@ -104,7 +104,7 @@ def load(path: str | os.PathLike[str]) -> Solution:
     """
     with open_file(path, FORMAT, FORMAT_VERSION) as file:
         problem = Problem.from_dict(json.loads(array(file, "problem")))
-        answer = _read_answer(file["answer"], file["history"], problem)
+        answer = _read_answer(file, problem)
         certificate = UNCERTIFIED
         if "certificate" in file:
             certificate = _read_certificate(file["certificate"])
@@ -195,7 +195,8 @@ def _write(file: h5py.File, solution: Solution) -> None:
             put(group, name, [getattr(check, name) for check in certificate.checks], dims="check")
 
 
-def _read_answer(group: h5py.Group, steps: h5py.Group, problem: Problem) -> Answer:
+def _read_answer(file: h5py.File, problem: Problem) -> Answer:
+    group, steps, path = file["answer"], file["history"], file["gait"]
     arrays = {name: array(group, name) for name in _ANSWER_ARRAYS}
     names = [f.name for f in dataclasses.fields(Answer) if f.name not in _SEPARATE]
     plain = {name: attribute(group, name) for name in names}
@@ -217,6 +218,11 @@ def _read_answer(group: h5py.Group, steps: h5py.Group, problem: Problem) -> Answ
     if arrays["x"].shape != (layout.n,) or not np.isfinite(arrays["x"]).all():
         raise StoreError("its variables do not fit its mesh.")
     gait = control.admissible.member(arrays["x"][layout.decisions])
+    for name in {"table", "corners"} & set(path):
+        if not np.allclose(getattr(gait, name), table := array(path, name), rtol=0, atol=1e-9):
+            # of a version whose parameters meant other gaits on other machines
+            gait = dataclasses.replace(gait, **{name: table})
+            arrays["x"][layout.decisions] = control.admissible.parameters(gait)
     return Answer(problem, gait, **arrays, **plain, second_order=second, history=history)
 
 

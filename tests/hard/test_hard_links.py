@@ -16,8 +16,7 @@ def column(*values):
 
 
 def graded_quadrature(vs, vn, w, length, delta):
-    """Integrals over a link of 1/r, sigma/r, sigma^2/r, y/r and sigma y/r, and of their sizes:
-    Gauss panels graded geometrically towards the slowest point."""
+    """Integrals over a link, and of sizes: Gauss panels graded towards the slowest point."""
     nodes, weights = np.polynomial.legendre.leggauss(20)
     half = 0.5 * length
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
