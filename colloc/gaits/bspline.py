@@ -375,6 +375,7 @@ class Polygon(Splines):
 
 
 def _best_corners(points: np.ndarray, pieces: int) -> np.ndarray:
+    """Indices of ``pieces + 1`` points whose chords are nearest to all (dynamic programming)."""
     n = points.shape[1]
     cost, before = np.full((n, n), np.inf), np.triu(np.ones((n, n)), 1)
     for i in range(n - 1):

@@ -119,15 +119,15 @@ class LinearSpace(SearchSpace):
         return self.shape_vjp(v, on_shape.reshape(len(on_shape), -1) @ matrix)
 
     def constraints(self, v: np.ndarray, later: float = 0.0, reach: float = 0.0) -> Constraints:
-        """Shape constraints at their worst instants in cells where they might bind, then the square
-        of the shape speed."""
+        """Shape constraints at their worst instants in cells where they might bind, or would by
+        changes of `reach`, then the square of the shape speed."""
         return self._constraints(v, later, reach) if later or reach else self._at_worst(v)
 
     def _constraints(self, v: np.ndarray, later: float = 0.0, reach: float = 0.0) -> Constraints:
         gaits, checks, mesh, table = self._gaits, self.checks, self.mesh, self._table(v)
         which, cells, times = near_peaks(gaits, table, mesh, checks, self._limit, reach)
         times = times + later * mesh.h[cells]
-        shapes = checks.shapes(gaits, self._table(v), which, times)
+        shapes = checks.shapes(gaits, table, which, times)
         placed = Placed(checks, which, cells, times, checks.shares(which, shapes))
         values = checks.values(which, shapes)
         lower, upper = (each[which] for each in checks.bounds(self._limit))

@@ -122,7 +122,8 @@ class SearchSpace:
         return np.empty((len(on_points), 0))
 
     def constraints(self, v: np.ndarray, later: float = 0.0, reach: float = 0.0) -> Constraints:
-        """Path constraints at the worst instants of v, or later by a part of the mesh cell."""
+        """Path constraints at the worst instants of v, or later by a part of the mesh cell, with
+        those that bind after changes of `reach`."""
         none = np.empty((0, 0))
         return Constraints({}, _EMPTY, _EMPTY, -np.inf, lambda v: _EMPTY, lambda v: none)
 

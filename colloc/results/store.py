@@ -220,7 +220,7 @@ def _read_answer(file: h5py.File, problem: Problem) -> Answer:
     gait = control.admissible.member(arrays["x"][layout.decisions])
     for name in {"table", "corners"} & set(path):
         if not np.allclose(getattr(gait, name), table := array(path, name), rtol=0, atol=1e-9):
-            # of a version whose parameters meant other gaits on other machines
+            # of a version whose parameters meant others on other machines
             gait = dataclasses.replace(gait, **{name: table})
             arrays["x"][layout.decisions] = control.admissible.parameters(gait)
     return Answer(problem, gait, **arrays, **plain, second_order=second, history=history)

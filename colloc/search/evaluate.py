@@ -310,7 +310,7 @@ class _Series(NamedTuple):
 _UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180, "°": np.pi / 180}
 _POINTS = {"tail": 0, "centre": 1, "center": 1, "head": 2}
 _ACCURACY = 1e-5  # of the motion [body lengths]
-_STEP = 1e-3  # of x in differences
+_STEP = 2e-2  # of x in differences: with smaller ones slipping wheels are kinks, not slopes
 _VAGUE, _HELD = 3.0, 1e-2
 """Standard deviations of x before anything is measured, and of what the motion does not tell."""
 _FARTHEST = math.log(100.0)  # largest x
@@ -436,7 +436,7 @@ def identify(
                 "with inertia the motion determines all coefficients: leave mu_forward out."
             )
         fit.stated *= mu_forward / fit.stated[fit.forward]
-    x, best = np.zeros(len(fit.free)), math.inf
+    x, best, noise = np.zeros(len(fit.free)), math.inf, fit.noise
     before = fit.rms(fit.off(x))
     for begin in (0.0, 0.7, -0.7):  # of logarithms: squares may have several minima
         trial = np.full(x.size, begin)
@@ -475,10 +475,8 @@ def identify(
         )
     points = [name for name, k in _POINTS.items() if fit.seen[0, k].any() and name != "center"]
     unit = f"lengths of {length:g} m" if length else "lengths"
-    message = (
-        f"{fitted.describe(used)}{at_pace}; path of {', '.join(points) or 'headings'} in body "
-    )
-    message += unit
+    path_of = ", ".join(points) or "headings"
+    message = f"{fitted.describe(used)}{at_pace}; path of {path_of} in body {unit}"
     both = zip(values.tolist(), errors.tolist(), strict=True)
     coefficients = dict(zip(fit.names, both, strict=True))
     return Identified(fit.with_(x, 5), coefficients, before, after, tuple(remarks), message)

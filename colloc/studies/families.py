@@ -269,6 +269,7 @@ def read_front(table: Path, problem: Problem) -> ParetoFront | None:
 
 @lru_cache(maxsize=256)
 def _measure(solution: Solution, aims: Objectives) -> np.ndarray:
+    """Objectives of a solution and their errors, ``(2, 2)``, from its certificate or a replay."""
     problem, measured = solution.problem, []
     for aim in aims:
         period: Period = solution.certificate

@@ -76,16 +76,17 @@ def read_table(path: Path) -> Table:
                 f"{path}, line {k}, names the columns again: the file holds two records; give one "
                 f"of them."
             )
+    texts, thousands = [row.cells for row in data], "commas of thousands"
+    for j, column in enumerate(zip(*texts, strict=True)):
+        written = [x for x in column if not is_blank(x)]
+        if len({"," in x for x in written}) > 1 and all(map(_THOUSANDS.fullmatch, written)):
+            notes += [thousands] * (thousands not in notes)
+            for cells in texts:
+                cells[j] = cells[j].replace(",", "")
     some = [x for row in data[:_MANY] for x in row.cells]
     if any("," in x for x in some if _is_number(x)):
         points = any("." in x for x in some)
         notes.append("commas in numbers" if points else "decimal commas")
-    texts = [row.cells for row in data]
-    for j, column in enumerate(zip(*texts, strict=True)):
-        written = [x for x in column if not is_blank(x)]
-        if len({"," in x for x in written}) > 1 and all(map(_THOUSANDS.fullmatch, written)):
-            for cells in texts:
-                cells[j] = cells[j].replace(",", "")
     values = np.array([list(map(_number, row)) for row in texts]).reshape(len(data), width)
     before = "\n".join(lines[: rows[first].line - 1 if first < len(rows) else None])
     return Table(names, units, values, texts, [row.line for row in data], before, notes)

@@ -285,6 +285,7 @@ class FullProgram(Program):
         self.change = self.repeat(change, [tail, layout.centre, *self._momenta_and_pace()])
 
     def _contact(self, group: Any) -> np.ndarray:
+        """Force in the plane, moment and power of parts under one law."""
         layout, contact, law, rows = self.layout, self.chain.contact, group.law, group.rows
         links, n_part = np.array(contact.links)[rows], len(contact.parts)
         moving = [layout.directions, layout.spins, layout.vx, layout.vy, layout.x, layout.y]
@@ -468,6 +469,7 @@ class FullProgram(Program):
         self.add("orientation", rows, even, even)
 
     def _ways(self) -> tuple[Any, Any, Any]:
+        """Rows of the velocities ahead and across, and of the power."""
         if self.layout.z.size:
             return tuple(self.pick(self.point[k]) for k in (3, 4, 5))
         mass, angle = self._spread(self.chain.mass_column().T), self.dynamics.regime.ahead

@@ -238,6 +238,7 @@ _Breaks = np.ndarray | tuple[float, ...]
 def _through_periods(
     run: Callable[[np.ndarray], Course], start: np.ndarray, periods: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Phases, states there, and states at the ends of periods ``(n_state, periods + 1)``."""
     courses, ends = [], [start]
     for _ in range(periods):
         courses.append(run(ends[-1]))

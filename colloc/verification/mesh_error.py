@@ -473,6 +473,7 @@ def plan_mesh(
 
 
 def _by_error(shares: np.ndarray, wanted: float) -> tuple[np.ndarray, int]:
+    """Intervals by falling error, and how many of them hold most of the excess."""
     order = np.argsort(shares)[::-1]
     return order, int((np.cumsum(shares[order]) < shares.sum() - 0.3 * wanted).sum())
 

@@ -55,7 +55,7 @@ _SLACK = 0.05
 """Of a panel, by which instants beside it may lie elsewhere."""
 _REACH = 0.5 + _SLACK
 """Of a panel, within which the instants beside it lie."""
-_CORNER = 1e-6  # relative jump between neighbouring panels that is a corner or another branch
+_CORNER = 1e-6  # relative jump between neighbouring panels, or ends [rad], that is none by rounding
 
 
 class Panels(NamedTuple):

@@ -71,7 +71,7 @@ READ = {
     "Latin-1": (("t;q1 [°];q2 [°];q3 [°]\n" + table(SECONDS, D, E, F, between=";")).encode("cp1252"), "degrees"),
     "quoted": ('"t","q1","q2","q3"\n' + table(*([f'"{x:.8e}"'.replace("e", "D") for x in each] for each in (SECONDS, A, B, C))), "from q1"),
     "thousands": ("t_ms;q1;q2;q3\n" + table([f"{1e4 * s:,.1f}" for s in SECONDS], A, B, C, between=";"), "commas in numbers"),
-    "whole thousands": ("t_ms;q1;q2;q3\n" + table([f"{100 * k:,}" for k in range(60)], A, B, C, between=";"), "time in ms; .* commas in numbers"),
+    "whole thousands": ("t_ms;q1;q2;q3\n" + table([f"{100 * k:,}" for k in range(60)], A, B, C, between=";"), "time in ms; .* commas of thousands"),
     "equal rows": ("t,q1,q2,q3\n" + "".join(line + "\n" + line + "\n" for line in table(SECONDS, A, B, C).splitlines()), "60 rows like the one before left out"),
     "blank cells": ("t,q1,q2,q3\n0,,,\n" + table(SECONDS[1:], A[1:], B[1:], C[1:]) + "4,nan,0.2,-\n", "2 rows with blank cells left out"),
     "a last line cut short": ("t,q1,q2,q3\n" + table(SECONDS, A, B, C) + "4.0,0.8", "line 62, the last one, cut short"),
