@@ -114,8 +114,8 @@ def explore(
     problem: Problem, starts: int | None = None, known: Sequence[AnyGait] = ()
 ) -> Exploration:
     """The best gaits of a problem's class that so many starts, and at most three times as many,
-    lead to, and gaits that are known: by default 32, with inertia 16 beside the optima of slow
-    motion or 96 without these, or fewer once some of them have met the best one.
+    lead to, and gaits that are known: by default 32, with inertia 96 where no optima of slow motion
+    are known, or fewer once some of them have met the best one.
 
     Where they shrink until nobody sees them move, the search begins anew among gaits at least as
     large as the best optimum of finite size; without one, as large as the default guess is, or as
@@ -264,8 +264,8 @@ def multistart(
     slow = slow_optima(problem)
     run, ahead = active_run(), active_run().ahead
     count = starts or OPTIONS.starts
-    if problem.regime.froude and not starts:  # where all is known of slow motion hops are left
-        count = count // 2 if slow else count * OPTIONS.max_starts
+    if problem.regime.froude and not slow and not starts:
+        count *= OPTIONS.max_starts
     most = OPTIONS.max_starts * count
     coarse = problem.with_(intervals=min(problem.intervals, problem.usual_intervals // 2))
     # gaits are compared where friction is nearly dry

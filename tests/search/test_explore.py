@@ -128,7 +128,7 @@ def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkey
         (None, [0, 4, 8, 34], 0.1, 35, 0),
         (None, range(4), 0.1, 24, 0),  # a quarter of the starts at least
         (None, [0, 1, 2, 70], 0.1, 96, 0),  # an eighth is too few
-        (None, [], 0.1, 16, 5),  # fewer where optima of slow motion are known
+        (None, [], 0.1, 32, 5),  # fewer where optima of slow motion are known
         (32, range(32), 0.0, 32, 0),  # as many as were asked for
     ],
 )
