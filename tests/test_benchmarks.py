@@ -5,7 +5,6 @@ import ast
 import importlib
 import runpy
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -122,8 +121,6 @@ OPTIONAL = {"docs_site": "mkdocs", "play_in_mujoco": "mujoco"}
 """Modules that need more than the tests do."""
 EXAMPLES = ("continue_delta", "continue_epsilon")
 """A dozen lines without a function, to be read."""
-LONGEST_IMPORT = 5.0
-"""Processor seconds; the libraries take one or two, the shortest of the studies ten."""
 
 
 def needed(path):
@@ -139,13 +136,10 @@ def name_of(path):
 def test_importing_a_module_does_nothing_else(path, tmp_path, monkeypatch, capfd):
     needed(path)
     monkeypatch.chdir(tmp_path)
-    before = time.process_time()
     # a fresh run of the file, whoever imported the module before
     runpy.run_path(str(path), run_name="imported")
-    spent = time.process_time() - before
     assert capfd.readouterr() == ("", "")
     assert not list(tmp_path.iterdir())
-    assert spent < LONGEST_IMPORT
 
 
 def starts_itself(path):

@@ -99,17 +99,33 @@ def test_the_summary_quoted_in_the_tutorial_is_what_a_solve_says(three_link, sol
     texts = blocks("docs/tutorial.md", "text")
     quoted = [block for block in texts if "distance d" in block or "gait   " in block]
     said = summary_lines(three_link, solved("three_link")[1])
-    told, checked = [said, summary_lines(three_link, None, verbose=True)], 0
-    wordless = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e-?\d+)?")
-    for block, lines in zip(quoted, told, strict=True):
-        for line in map(str.rstrip, block.splitlines()):
-            if line.lstrip().startswith(("three_link:", "all 15 checks", "upper bound", "saved")):
-                continue
-            same = next(x for x in lines if wordless.sub("", x) == wordless.sub("", line))
-            for mine, theirs in zip(numbers(line), numbers(same), strict=True):
-                assert mine == pytest.approx(theirs, rel=1e-3, abs=1e-3)
-            checked += 1
-    assert checked == 7
+    verbose = summary_lines(three_link, None, verbose=True)
+    skipped = "three_link:", "all 15 checks", "upper bound", "saved"
+    said = [same_lines(*pair, skipped) for pair in zip(quoted, [said, verbose], strict=True)]
+    assert sum(said) == 7
+
+
+def same_lines(block, printed, skipped, rel=1e-3):
+    """How many lines of a block are among the printed ones, with such numbers."""
+    checked, wordless = 0, re.compile(r"[-+]?\d+(?:\.\d+)?(?:e-?\d+)?")
+    for line in filter(str.strip, block.splitlines()):
+        if line.lstrip().startswith(skipped):
+            continue
+        same = next(x for x in printed if wordless.sub("", x) == wordless.sub("", line.rstrip()))
+        for mine, theirs in zip(numbers(line), numbers(same), strict=True):
+            assert mine == pytest.approx(theirs, rel=rel, abs=1e-3)
+        checked += 1
+    return checked
+
+
+@pytest.mark.slow
+def test_the_robot_of_the_readme_goes_as_it_says(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    commands, printed = blocks("README.md", "sh")[2], blocks("README.md", "text")[1]
+    for line in re.findall(r"^colloc ((?:init|solve) [^#\n]*)", commands, re.MULTILINE):
+        assert main(line.split()) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert same_lines(printed, lines, ("...", "from rest"), rel=0.01) == 2
 
 
 def test_messages_quoted_in_troubleshooting_are_the_programs_own():

@@ -98,9 +98,8 @@ def test_the_problem_file_does_what_it_says(file, solved, tmp_path, monkeypatch,
         with Image.open(f"{file.stem}.gif") as film:
             assert film.n_frames > 1
         Image.open(f"{file.stem}.png").verify()
-        assert last_numbers(capsys.readouterr().out) == pytest.approx(
-            last_numbers(before["printed"]), rel=1e-3, abs=1e-3
-        )
+        printed, now = (last_numbers(x) for x in (before["printed"], capsys.readouterr().out))
+        assert now == pytest.approx(printed, rel=1e-3, abs=1e-3)
 
 
 def test_the_gallery_has_the_numbers_of_all_files_and_the_pictures_of_all_scripts():

@@ -419,8 +419,8 @@ class Inertial(QuasiStatic):
         self, mesh: Mesh, shapes: Shapes, near: np.ndarray, static: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
         """Periodic states, outputs, and whether they exist. Where Newton's method fails from
-        `near`, as on sticking feet, by continuation through more viscous friction, in steps that
-        shrink where it fails again, as where one wheel after another begins to slip."""
+        `near`, by continuation through more viscous friction, in steps that shrink where it fails
+        again, as where wheel after wheel slips."""
         found, delta, ratio = self._newton(mesh, shapes, near, static), shapes.delta, _WETTER
         while not found[-1] and delta * shapes.unit <= _VISCOUS:
             delta *= _WETTER

@@ -227,8 +227,8 @@ def _stage_matrices(a: np.ndarray, on_states: np.ndarray) -> np.ndarray:
 
 
 class _Linear:
-    """``I - H R``, condensed to the states at the edges: rows that close a period or say where it
-    starts, and for every interval ``end - through begin``."""
+    """``I - H R``, condensed to the states at the edges: rows that close or begin a period, and for
+    every interval ``end - through begin``."""
 
     @_FAR
     def __init__(

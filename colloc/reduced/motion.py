@@ -93,7 +93,6 @@ class ReducedMotion:
         self._compiled = CompiledPeriod.of(kind, mesh)
         self._last: _State | None = None
         self._differentiated: _State | None = None
-        self.solves = 0
 
     def at(self, v: np.ndarray, delta: float) -> _State:
         """The collocated motion; NaN where the balance cannot be solved."""
@@ -104,7 +103,6 @@ class ReducedMotion:
         shapes, static = Shapes(angles, rates, delta, pace=pace), v[v.size - self._n_static :]
         of_v = v.copy(), delta, mesh, shapes, kind.initial_heading(static)
         begin, compiled = self._differentiated or last, self._compiled
-        self.solves += 1
         if compiled is not None and begin is not None and compiled.covers(shapes):
             found = compiled.simulate(shapes, begin.z, begin.shapes)
             if found is not None:
@@ -151,8 +149,7 @@ class ReducedMotion:
     def _start(
         self, shapes: Shapes, static: np.ndarray
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """States and tail velocities to start from: those of the last gait differentiated, moved
-        along its slopes, or of the last one."""
+        """States and tail velocities to start from, along slopes where known."""
         kind, last, begin = self.kind, self._last, self._differentiated
         if kind.states and last is not None:
             is_near = begin is not None and begin.delta == shapes.delta

@@ -53,6 +53,7 @@ from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
 from colloc.search.optimise import (
     delta_levels,
     descend,
+    halved,
     optimise,
     project_to_zero_rotation,
     regularisation_dominated,
@@ -167,9 +168,8 @@ def farthest(problem: Problem) -> list[Iterate]:
 
 def with_reachable_distance(problem: Problem) -> tuple[Problem, list[AnyGait]]:
     """The problem with its `least_distance` among `at_least`: all of it, or half of what the
-    farthest gait goes, if that is less; and the gaits that go farthest, for a search to begin from,
-    as few others may go as far. They are known first, unless the guess goes twice as far, so that
-    no search is for a distance that no gait reaches."""
+    farthest gait goes, if that is less; and the gaits that go farthest, as few others may go as
+    far. They are known first, unless the guess goes twice as far."""
     stated = {aim.name for aim, _ in problem.at_least}
     if problem.least_distance is None or "distance" in stated or not problem.gait.free:
         return problem, []
@@ -413,10 +413,7 @@ def _levels_here(smallest: float, *deltas: float) -> list[list[Candidate]]:
 
 def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int) -> Exploration:
     """Distinct optima of promising candidates at the final delta, those close to the best on the
-    whole mesh.
-
-    Gaits of finite size may shrink on the way, so they are followed until one has not.
-    """
+    whole mesh. Gaits may shrink on the way: they are followed until one has not."""
     if not candidates:
         limited = " that keeps the limits of its joints" if problem.path_limits.names else ""
         raise NotConvergedError(
@@ -497,8 +494,7 @@ def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int
 
 def follow(problem: Problem, iterate: Iterate) -> Iterate:
     """The gait at the final delta, on a mesh of half the interval."""
-    edges = iterate.space.mesh.edges
-    space = space_of(problem, np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])])))
+    space = space_of(problem, halved(iterate.space.mesh.edges))
     v = space.parameters(iterate.gait)
     return descend(optimise(space, v, iterate.delta, MEDIUM))
 

@@ -83,10 +83,14 @@ def optimise(
     space: SearchSpace, v: np.ndarray, delta: float, kkt: float, hessian: np.ndarray | None = None
 ) -> Iterate:
     """Optimum that SQP reaches from parameters v ``(n,)``, not necessarily admissible, at delta (in
-    the units of the class); `NotConvergedError` if there is no periodic motion at v."""
-    begin, start = time.perf_counter(), v
+    the units of the class), on a mesh of half the intervals where there is no periodic motion at v;
+    `NotConvergedError` if there is none on that either."""
+    begin, start, problem = time.perf_counter(), v, space.control.problem
     while True:
         program = ReducedProgram(space, delta)
+        if np.isnan(program.objective(start)):  # as where few points see a coasting body slip
+            space = space_of(problem, halved(space.mesh.edges), space.scheme, space.far)
+            program = ReducedProgram(space, delta)
         if np.isnan(program.objective(start)):
             lack = program.motion.kind.lack
             raise NotConvergedError(f"there is no motion to begin with: {lack}.")
@@ -95,7 +99,7 @@ def optimise(
         if not crossing:
             break
         start, hessian = last_free(space, v, end), None
-        space = space_of(space.control.problem, space.edges, space.scheme, space.far + crossing)
+        space = space_of(problem, space.edges, space.scheme, space.far + crossing)
     space.motion = program.motion
     return evaluate_at(
         *(space, end, delta, kkt, program, conditions),
@@ -103,6 +107,10 @@ def optimise(
         seconds=time.perf_counter() - begin,
         hessian=hessian,
     )
+
+
+def halved(edges: np.ndarray) -> np.ndarray:
+    return np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
 
 
 def crossing_pairs(space: SearchSpace, v: np.ndarray) -> Pairs:

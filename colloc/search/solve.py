@@ -125,9 +125,9 @@ def _solve(
 
 
 def _finish_best(problem: Problem, optima: Sequence[Iterate]) -> list[Solution]:
-    """Solutions of the best optima: of finite size first, then better ones that shrank; all in one
-    order where the problem asks for any size. Of each kind, best first, as long as none passes, or
-    it lost more on its refined mesh than the next one is behind."""
+    """Solutions of the best optima: of finite size first, then better ones that shrank; together
+    where the problem asks for any size. Best first, as long as none passes, or it lost more on its
+    refined mesh than the next one is behind."""
     solutions: list[Solution] = []
     for shrank in (None,) if problem.shrinking else (False, True):
         best, least = -np.inf, -np.inf

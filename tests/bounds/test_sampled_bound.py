@@ -222,9 +222,8 @@ def test_roughness_is_the_integral_of_squared_second_derivatives(n_joint):
     c = np.linalg.lstsq(functions(spline, q).toarray(), q[0] ** 2 * q[1], rcond=None)[0]
     np.testing.assert_allclose(functions(spline, q) @ c, q[0] ** 2 * q[1], atol=1e-10)
     # the midpoint rule with 8 points an axis misses 1/64 of the mean square
-    assert c @ spline.roughness @ c == pytest.approx(
-        16 * a**4 * (2 * a) ** (n_joint - 2) * (1 - 1 / 64), rel=1e-9
-    )
+    exact = 16 * a**4 * (2 * a) ** (n_joint - 2) * (1 - 1 / 64)
+    assert c @ spline.roughness @ c == pytest.approx(exact, rel=1e-9)
 
 
 def test_climbs_find_the_summit_of_a_crease():

@@ -46,9 +46,8 @@ def both(problem, follow=False, iterations=60, **settings):
     # the motion that the kernel leaves is that of the gait it leaves
     fresh, _ = program_of(problem, follow)
     v = ends[0].v
-    assert compiled.motion.values(v, _DELTA) == pytest.approx(
-        fresh.motion.values(v, _DELTA), abs=1e-11
-    )
+    values = fresh.motion.values(v, _DELTA)
+    assert compiled.motion.values(v, _DELTA) == pytest.approx(values, abs=1e-11)
     return ends
 
 

@@ -166,9 +166,8 @@ def test_a_way_on_a_slope_may_lead_off_by_a_thousandth_of_a_radian(part, passes)
     ran = colloc.slope_motion(Chain(), Friction(), gait, 1e-2, 0.1, tolerance=1e-3)
     goes = np.arctan2(ran.aside[0], ran.climb[0])
     asked = {"delta": 1e-2, "grade": 0.1, "towards": goes + part * 1e-3}
-    found = gait_certificate(
-        Problem("aside", gait=Harmonic(1), **asked), gait, 1e-2, np.empty(0), tolerance=1e-3
-    )
+    aside = Problem("aside", gait=Harmonic(1), **asked)
+    found = gait_certificate(aside, gait, 1e-2, np.empty(0), tolerance=1e-3)
     (check,) = (check for check in found.checks if check.name == "direction")
     assert check.passed == passes
     assert check.value == pytest.approx(-part * 1e-3, abs=1e-4)
@@ -242,9 +241,8 @@ def test_the_limit_of_small_delta_is_exact_where_delta_acts_linearly():
     hidden = extrapolated_limit([linear[0], linear[1], linear[1]], [0.0, 0.0, 0.0])
     assert hidden[1] == pytest.approx(3e-4, rel=1e-9)
     # the last value is moved by a ninth of the last change: so is what it may be wrong by
-    assert extrapolated_limit([0.25] * 3, [7e-3, 9e-4, 2e-4])[1] == pytest.approx(
-        2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12
-    )
+    error = extrapolated_limit([0.25] * 3, [7e-3, 9e-4, 2e-4])[1]
+    assert error == pytest.approx(2e-4 + (2e-4 + 9e-4) / 9, rel=1e-12)
 
 
 def test_other_motions_count_as_error_and_explain_gaps(failures, three_link, replays, monkeypatch):

@@ -332,9 +332,8 @@ def test_the_answer_keeps_both_sides_and_uses_one(one_sided, tmp_path):
 
 
 def test_mirrored_ranges_give_the_mirrored_gait(one_sided):
-    mirrored = colloc.solve(
-        problem(tuple((-high, -low) for low, high in ONE_SIDED), Harmonic(1, "bilateral")), starts=4
-    )
+    limits = tuple((-high, -low) for low, high in ONE_SIDED)
+    mirrored = colloc.solve(problem(limits, Harmonic(1, "bilateral")), starts=4)
     assert mirrored.efficiency == pytest.approx(one_sided.efficiency, rel=1e-6)
 
 
@@ -344,9 +343,8 @@ def test_polygons_keep_both_sides_use_them_and_mirror():
     aside = Fourier([0.5, -0.5], [[0.9], [-0.9]], [[0.5], [0.5]])
     stated = Problem("paths", gait=gait, delta=1e-2, mesh_tolerance=1e-2, smallest_shape_speed=0.4)
     here = colloc.solve(stated.with_(joint_limit=((-1, 2), (-2, 1)), guess=aside), starts=1)
-    there = colloc.solve(
-        stated.with_(joint_limit=((-2, 1), (-1, 2)), guess=aside.scaled(-1)), starts=1
-    )
+    other_way = stated.with_(joint_limit=((-2, 1), (-1, 2)), guess=aside.scaled(-1))
+    there = colloc.solve(other_way, starts=1)
     assert here.success
     assert there.efficiency == pytest.approx(here.efficiency, rel=1e-9)
     first, second = here.gait.angles(np.linspace(0, 1, 4001))
@@ -421,9 +419,8 @@ def test_between_points_of_a_mesh_less_is_allowed_to_both_sides():
     program = ReducedProgram(space, stated.delta)
     excess, placed = program.place_rows(v), program.actuators
     at = stated.body, stated.friction, stated.guess, stated.delta
-    assert excess == pytest.approx(
-        replay(*at, limits=stated.path_limits).shares.max() - 1, abs=1e-4
-    )
+    largest = replay(*at, limits=stated.path_limits).shares.max()
+    assert excess == pytest.approx(largest - 1, abs=1e-4)
     assert placed.upper.min() < 0.95
     np.testing.assert_array_equal(placed.lower[:2], -placed.upper[:2])
     assert np.isinf(placed.lower[2:]).all()

@@ -12,6 +12,7 @@ from benchmarks.zoo import robot_problem
 from colloc import Chain, Foot, Friction, Harmonic, Polygon, Problem, Viscous, Wheel, load, save
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.contact import crossing_depth
+from colloc.reduced.program import ReducedProgram
 from colloc.results.checks import UNCERTIFIED
 from colloc.results.comparison import distance
 from colloc.search import explore
@@ -20,6 +21,7 @@ from colloc.search.checkpoint import Run
 from colloc.search.explore import multistart, small_loops
 from colloc.search.iterate import space_near
 from colloc.search.optimise import optimise, regularisation_dominated
+from colloc.search.options import COARSE
 from colloc.search.solve import solve
 from tests.shared.cases import slow
 
@@ -235,12 +237,10 @@ def test_ends_off_the_motion_in_time_are_no_reason_to_follow_no_more_and_give_wa
 ):
     mesh, problem = SimpleNamespace(n=9, edges=np.linspace(0, 1, 10)), Problem("ends")
     space = SimpleNamespace(mesh=mesh)
-    usual = {"violation": 0.0, "gait": GAIT, "delta": 1.0, "space": space}
+    usual = {"violation": 0.0, "gait": GAIT, "delta": 1.0, "space": space, "value": 1.0}
     ends = [
-        SimpleNamespace(
-            basin=min(k, 3) if k < 5 else k, strays=k < 4, objective=x, value=-x, **usual
-        )
-        for k, x in enumerate((-1.0, -0.999, -0.998, -0.997, -0.996, -0.995, -0.994, -0.993))
+        SimpleNamespace(basin=basin, strays=k < 4, objective=0.001 * k - 1.0, **usual)
+        for k, basin in enumerate((0, 1, 2, 3, 3, 5, 6, 7))
     ]
     monkeypatch.setattr(explore, "follow", lambda problem, candidate: candidate)
     monkeypatch.setattr(explore, "same_gait", lambda problem, a, b: a.basin == b.basin)
@@ -268,12 +268,9 @@ def test_where_no_certificate_holds_the_best_of_gaits_that_were_left_is_the_answ
     monkeypatch.setattr(stages, "finish", failing)
     solution = solve(problem, 6)
     assert len(asked) > len(explored.optima) > 0
-    assert solution.value == pytest.approx(
-        max(other.value for other in asked[len(explored.optima) :]), rel=1e-2
-    )
-    assert not any(
-        explore.same_gait(problem, one, other) for one, other in itertools.combinations(asked, 2)
-    )
+    others = [other.value for other in asked[len(explored.optima) :]]
+    assert solution.value == pytest.approx(max(others), rel=1e-2)
+    assert not any(explore.same_gait(problem, *two) for two in itertools.combinations(asked, 2))
     monkeypatch.setattr(Run, "has_time", lambda run: False)
     assert explore.follow_rest(problem, explored) == []
 
@@ -281,11 +278,9 @@ def test_where_no_certificate_holds_the_best_of_gaits_that_were_left_is_the_answ
 @pytest.mark.slow
 def test_a_gait_that_jumps_between_balanced_motions_gives_way_to_one_that_certifies():
     """A foot between wheels: most that promises well turns in jumps whose phase no mesh decides."""
-    wheels = [
-        Wheel(link, place, rolling=0.056, weight=0.2872234)
-        for link, place in ((0, 0.24857), (2, 0.75143))
-    ]
-    feet = (wheels[0], Foot(1, 0.5, weight=1 - 2 * 0.2872234), wheels[1])
+    rolls = {"rolling": 0.056, "weight": 0.2872234}
+    foot = Foot(1, 0.5, weight=1 - 2 * 0.2872234)
+    feet = Wheel(0, 0.24857, **rolls), foot, Wheel(2, 0.75143, **rolls)
     floor, gait = Friction(mu_t=0.5488), Harmonic(1, "antipodal")
     solution = solve(Problem("rolls", None, Chain(feet=feet), floor, gait))
     assert solution.status == "solved"
@@ -330,3 +325,12 @@ def test_rounds_that_go_to_and_fro_between_joint_limits_come_to_an_end():
     stated, begun = robot_problem(21), colloc.Fourier.from_table(table)
     end = optimise(*space_near(stated, begun), stated.delta, 1e-3)
     assert end.violation < 1e-3 < 0.1 < 1.5 * end.value
+
+
+def test_where_no_motion_repeats_on_a_mesh_half_its_intervals_are_tried(monkeypatch):
+    """A body that coasts may have none at points that see little of how it slips."""
+    gait, value = colloc.ellipse(A0=0, A1=2.8, B1=1.3), ReducedProgram.objective
+    problem = Problem("coarse", gait, gait=Harmonic(1, "bilateral"), intervals=8)
+    finer = lambda at, v: value(at, v) if at.space.mesh.n > 8 else np.nan  # noqa: E731
+    monkeypatch.setattr(ReducedProgram, "objective", finer)
+    assert optimise(*space_near(problem, gait), 1e-2, COARSE).space.mesh.n == 16

@@ -75,9 +75,8 @@ def test_a_least_distance_is_reached_for_the_price_of_efficiency():
 
 @pytest.mark.slow
 def test_a_turning_gait_turns_by_the_prescribed_angle():
-    solution = solve(
-        Problem("turn", SKEW, gait=Harmonic(1), objective="turning", rotation=0.3, delta=1e-2), 1
-    )
+    turns = {"objective": "turning", "rotation": 0.3, "delta": 1e-2}
+    solution = solve(Problem("turn", SKEW, gait=Harmonic(1), **turns), 1)
     assert solution.success
     gait, problem = solution.gait, solution.problem
     at = problem.body, problem.friction, gait, solution.delta_per_period

@@ -277,9 +277,8 @@ def test_time_that_is_over_gives_the_best_gait_so_far(thread):
     if thread == "main":
         found.append(solve(problem, seconds=2.0))
     else:
-        worker = threading.Thread(
-            target=lambda: found.append(solve(problem, seconds=2)), daemon=True
-        )
+        target = lambda: found.append(solve(problem, seconds=2))  # noqa: E731
+        worker = threading.Thread(target=target, daemon=True)
         worker.start()
         worker.join(60)
     assert time.process_time() - begin < 6.0

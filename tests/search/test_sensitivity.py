@@ -45,9 +45,8 @@ def test_so_it_is_on_feet_and_where_gravity_and_inertia_are_as_much_stronger(nam
 
 def test_a_longer_middle_is_shorter_ends(found):
     """A part more of both ends, a third each, takes two parts of the middle."""
-    assert found["length of links 1 and 3"].slope == pytest.approx(
-        -2 * found["length of link 2"].slope, rel=1e-6
-    )
+    outer, middle = (found[f"length of {x}"].slope for x in ("links 1 and 3", "link 2"))
+    assert outer == pytest.approx(-2 * middle, rel=1e-6)
 
 
 def test_only_what_holds_the_gait_back_has_a_price(found, three_link):
