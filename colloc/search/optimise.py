@@ -3,8 +3,7 @@ refinement of the mesh.
 
 Subproblems are solved within a trust region, with the shape constraints at the worst instants of
 the last gait, until constraints, trust region and gait settle. Pairs of links more than two apart
-are constrained only once they cross (a cutting-plane method): a chain of n links has (n - 2)(n -
-3)/2 such pairs, and few of them ever come near each other.
+are constrained only once they cross (a cutting-plane method), as few ever come near each other.
 
 Every mesh is planned for the gait at hand (`colloc.verification.mesh_error`), and panels with it.
 """
@@ -27,7 +26,6 @@ from colloc.reduced.second_order import curvature
 from colloc.search.checkpoint import active_run, checkpoint
 from colloc.search.iterate import STATIONARY, Iterate, evaluate_at, space_near, space_of
 from colloc.search.options import (
-    COARSE,
     FINE,
     MEDIUM,
     OPTIONS,
@@ -47,8 +45,8 @@ def solve_subproblems(
     number of iterations, and the Hessian if it is known."""
     iterations, violation, ends, reach = 0, np.inf, [v], 0.0
     program.place_rows(v)
-    for done in range(max(4, max_rounds(kkt))):
-        if done >= max_rounds(kkt) and violation <= COARSE:
+    for done in range(2 * max_rounds(kkt)):
+        if done >= max_rounds(kkt) and violation <= max(kkt, MEDIUM):
             break  # more rounds are for gaits beyond their limits, else given up
         before, violation_before, is_fresh = v, violation, hessian is None
         if len(ends) > 1:
@@ -56,6 +54,8 @@ def solve_subproblems(
             program.follow_worst()
         result = minimize(program, v, OPTIONS.radius, objective_accuracy(kkt), curvature=hessian)
         v, iterations = result.v, iterations + result.iterations
+        rows = program.rows(v)
+        excess = np.maximum(program.row_lower - rows, rows - program.row_upper).max(initial=0.0)
         admissible = program.place_rows(v, reach) <= TOLERANCES.violation
         conditions = stationarity(program, v)
         stationary = conditions.kkt_error < kkt
@@ -67,9 +67,9 @@ def solve_subproblems(
             break
         stalled = abs(violation - violation_before) < OPTIONS.stalled * violation_before
         if violation > MEDIUM and stalled and not result.on_edge:
-            if 0 < reach <= step:
+            if excess > MEDIUM:
                 break  # the constraints are infeasible near here
-            reach = step  # rounds may go to and fro, where each breaks what has no row in it
+            reach = max(reach, step)  # rounds may go to and fro, each beyond what has no row in it
             program.place_rows(v, reach)
         ends.append(v)
         # the first round, with instants fixed, may leave an optimum that the second comes back to
@@ -210,9 +210,8 @@ def project_to_zero_rotation(problem: Problem, gait: AnyGait, delta: float) -> A
 
     Where reversed rates reverse the motion, net rotation and displacement are odd under reversal of
     the gait. So every retraced gait closes its rotation, goes nowhere and is a critical point of
-    the efficiency, into which searches that start far from closure fall: 19 of 75 starts at (1, 1,
-    1), (3, 1, 1) and (10, 1, 1). With the rotation closed first, at constant enclosed area, which a
-    retraced gait lacks, none does.
+    the efficiency, into which searches that start far from closure fall: 19 of 75 starts. With the
+    rotation closed first, at constant enclosed area, which a retraced gait lacks, none does.
 
     The gait itself where a symmetry closes the rotation, nothing prescribes it, or the gait is no
     Fourier series.

@@ -77,10 +77,8 @@ def moments(body, law, angles, rates, delta):
 def test_driven_power_scales_with_the_pace_as_friction_does(law, degree):
     angles, rates = random_instants(50)
     z = Chain().solve(law, angles, rates, 0.1).z
-    slow, fast = (
-        DRIVEN_WORK.at(Instants(Chain(), law, angles, pace * rates, pace * 0.1, z=pace * z))
-        for pace in (1.0, 3.0)
-    )
+    at = (Instants(Chain(), law, angles, pace * rates, pace * 0.1, z=pace * z) for pace in (1, 3))
+    slow, fast = map(DRIVEN_WORK.at, at)
     np.testing.assert_allclose(fast, 3.0 ** (1 + degree) * slow, rtol=1e-9)
 
 
@@ -200,10 +198,8 @@ def test_a_middle_joint_may_be_weaker_than_the_best_gait_wants_and_multipliers_p
     assert found.status == "solved"
     # the price of a limit is the sum of the multipliers of its rows: shares are moments over it
     price = np.abs(found.answer.lam_g[-3 * found.mesh.n_point :]).sum() / 0.047
-    less, more = (
-        found.problem.with_(torque_limit=(0.1, limit, 0.1), guess=found.gait)
-        for limit in (0.0465, 0.0475)
-    )
+    limits = ((0.1, middle, 0.1) for middle in (0.0465, 0.0475))
+    less, more = (found.problem.with_(torque_limit=at, guess=found.gait) for at in limits)
     gained = solve(more, 1).efficiency - solve(less, 1).efficiency
     assert gained / 1e-3 == pytest.approx(price, rel=0.05)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import colloc
-from benchmarks.zoo import robot_problem
+from benchmarks.zoo import best_serpenoid, robot_problem
 from colloc import Chain, Foot, Friction, Harmonic, Polygon, Problem, Viscous, Wheel, load, save
 from colloc.gaits.starts import on_speed_floor
 from colloc.mechanics.contact import crossing_depth
@@ -325,6 +325,13 @@ def test_rounds_that_go_to_and_fro_between_joint_limits_come_to_an_end():
     stated, begun = robot_problem(21), colloc.Fourier.from_table(table)
     end = optimise(*space_near(stated, begun), stated.delta, 1e-3)
     assert end.violation < 1e-3 < 0.1 < 1.5 * end.value
+
+
+@pytest.mark.slow
+def test_rounds_whose_worst_instants_move_a_little_each_time_go_on():
+    """Each kept its own rows; after four of them these counted as a contradiction."""
+    robot = robot_problem(5)
+    assert solve(robot.with_(guess=best_serpenoid(robot).gait), 1).status == "solved"
 
 
 def test_where_no_motion_repeats_on_a_mesh_half_its_intervals_are_tried(monkeypatch):

@@ -159,10 +159,8 @@ def test_a_gait_that_turns_and_points_elsewhere_fails_its_certificate(uphill):
 
 def test_the_error_of_a_mesh_is_known_interval_by_interval(uphill):
     space, v = space_near(PROBLEM, uphill.gait, np.linspace(0.0, 1.0, 21))
-    fine, coarse = (
-        mesh_error(control_problem(PROBLEM), mesh, uphill.gait, 1e-2)
-        for mesh in (uphill.mesh, space.mesh)
-    )
+    control, meshes = control_problem(PROBLEM), (uphill.mesh, space.mesh)
+    fine, coarse = (mesh_error(control, mesh, uphill.gait, 1e-2) for mesh in meshes)
     assert fine.estimate < PROBLEM.mesh_tolerance < 0.1 * coarse.estimate
     assert coarse.total == pytest.approx(coarse.value.sum(), rel=0.05)
     own = -ReducedProgram(space, 1e-2).objective(v)
