@@ -402,10 +402,10 @@ def _draw_speeds(axes: Axes, solution: Solution) -> None:
 
 
 def _draw_power(axes: Axes, solution: Solution) -> None:
-    axes.plot(_T, solution.power(solution.sample(_T)), color=BLUE, lw=1.5)
-    units = drawn_units(solution)
-    axes.set(xlim=(0, 1), xlabel=units.of_time, ylabel=f"power  [{units.of_power}]")
-    axes.set_ylim(bottom=0)
+    power, units = solution.power(solution.sample(_T)), drawn_units(solution)
+    axes.plot(_T, power, color=BLUE, lw=1.5)
+    axes.set(xlim=(0, 1), ylim=(0, 1.1 * float(power.max())))
+    axes.set(xlabel=units.of_time, ylabel=f"power  [{units.of_power}]")
     _label_in(units.time, axes.xaxis)
     _label_in(units.power, axes.yaxis)
     _draw_mesh_ticks(axes, solution.answer.edges)

@@ -1,9 +1,9 @@
 """Many starts, cheaply told apart; the promising ones followed to the final delta.
 
 As docs/search.md says. Where a start meets a gait that an earlier one met at the same delta, it
-would go on as that one did. Small loops (`small_loops`) are slow, and so optimised at a smaller
-delta only. Optima of slow motion take a hundredth of the time of those with inertia; hops from the
-best of them follow.
+would go on as that one did. Small loops are slow, and so optimised at a smaller delta only. Optima
+of slow motion take a hundredth of the time of those with inertia; hops from the best of them
+follow.
 """
 
 from __future__ import annotations
@@ -509,7 +509,7 @@ def small_loops(problem: Problem) -> list[AnyGait]:
 
     Dry friction lets a loop of any size move a body, and at a few shapes, such as folded ones,
     which samples of a class hardly ever meet, small loops beat most large gaits. A linear program
-    gives the best one at a shape (`colloc.bounds.motions`); shapes are drawn from a coarse lattice.
+    gives the best one at a shape.
     """
     if problem.froude or not rate_independent(problem.law):
         return []
