@@ -67,9 +67,9 @@ def solve_subproblems(
             break
         stalled = abs(violation - violation_before) < OPTIONS.stalled * violation_before
         if violation > MEDIUM and stalled and not result.on_edge:
-            if excess > MEDIUM:
+            if excess > MEDIUM and 0 < reach <= step:
                 break  # the constraints are infeasible near here
-            reach = max(reach, step)  # rounds may go to and fro, each beyond what has no row in it
+            reach = step  # rounds may go to and fro, each beyond what has no row in it
             program.place_rows(v, reach)
         ends.append(v)
         # the first round, with instants fixed, may leave an optimum that the second comes back to
