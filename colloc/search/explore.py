@@ -2,8 +2,7 @@
 
 As docs/search.md says. Where a start meets a gait that an earlier one met at the same delta, it
 would go on as that one did. Small loops are slow, and so optimised at a smaller delta only. Optima
-of slow motion take a hundredth of the time of those with inertia; hops from the best of them
-follow.
+of slow motion take a hundredth of the time of those with inertia; hops follow.
 """
 
 from __future__ import annotations
@@ -245,7 +244,7 @@ def slow_optima(problem: Problem) -> list[AnyGait]:
     """Gaits that are best in slow motion, of a problem with inertia, the best first."""
     if (slow := in_slow_motion(problem)) is None:
         return []
-    candidates, _ = multistart(slow, None)
+    candidates, _ = multistart(slow, OPTIONS.max_starts * OPTIONS.starts)
     return [each.iterate.gait for each in candidates]
 
 
