@@ -492,7 +492,7 @@ def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int
 
 
 def follow(problem: Problem, iterate: Iterate) -> Iterate:
-    """The gait at the final delta, on a mesh of half the interval."""
+    """The gait at the final delta, with every interval halved."""
     space = space_of(problem, halved(iterate.space.mesh.edges))
     v = space.parameters(iterate.gait)
     return descend(optimise(space, v, iterate.delta, MEDIUM))

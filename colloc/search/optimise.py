@@ -83,7 +83,7 @@ def optimise(
     space: SearchSpace, v: np.ndarray, delta: float, kkt: float, hessian: np.ndarray | None = None
 ) -> Iterate:
     """Optimum that SQP reaches from parameters v ``(n,)``, not necessarily admissible, at delta (in
-    the units of the class), on a mesh of half the intervals where there is no periodic motion at v;
+    the units of the class), with every interval halved where there is no periodic motion at v;
     `NotConvergedError` if there is none on that either."""
     begin, start, problem = time.perf_counter(), v, space.control.problem
     while True:

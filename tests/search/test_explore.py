@@ -130,7 +130,7 @@ def test_a_gait_that_breaks_the_rows_of_its_class_in_the_end_is_no_answer(monkey
         (None, [0, 4, 8, 34], 0.1, 35, 0),
         (None, range(4), 0.1, 24, 0),  # a quarter of the starts at least
         (None, [0, 1, 2, 70], 0.1, 96, 0),  # an eighth is too few
-        (None, [], 0.1, 32, 5),  # fewer where optima of slow motion are known
+        (None, [], 0.1, 32, 5),  # a third of them where optima of slow motion are known
         (32, range(32), 0.0, 32, 0),  # as many as were asked for
     ],
 )
@@ -334,7 +334,7 @@ def test_rounds_whose_worst_instants_move_a_little_each_time_go_on():
     assert solve(robot.with_(guess=best_serpenoid(robot).gait), 1).status == "solved"
 
 
-def test_where_no_motion_repeats_on_a_mesh_half_its_intervals_are_tried(monkeypatch):
+def test_where_no_motion_repeats_on_a_mesh_every_interval_is_halved(monkeypatch):
     """A body that coasts may have none at points that see little of how it slips."""
     gait, value = colloc.ellipse(A0=0, A1=2.8, B1=1.3), ReducedProgram.objective
     problem = Problem("coarse", gait, gait=Harmonic(1, "bilateral"), intervals=8)
