@@ -53,9 +53,8 @@ class SampledMotion:
     tail: np.ndarray
 
     def __repr__(self) -> str:
-        return (
-            f"<SampledMotion at {self.t.size} instants, t = {self.t.min():g} to {self.t.max():g}>"
-        )
+        ends = " to ".join(f"{t:g}" for t in self.t[:: max(1, self.t.size - 1)])
+        return f"<SampledMotion at {self.t.size} instants, t = {ends}>"
 
 
 def motion_with_inertia(
@@ -159,15 +158,15 @@ def motion_frame(columns: dict[str, Column]) -> pandas.DataFrame:
         if column.dims == ("t",):
             flat[name] = column.values
         else:
-            named = zip(_labels(columns)[column.dims[0]], column.values, strict=True)
-            flat |= {f"{name}_{label}": row for label, row in named}
+            labels = zip(_labels(columns)[column.dims[0]], column.values, strict=True)
+            flat |= {f"{name}_{label}": row for label, row in labels}
     return optional("pandas").DataFrame(flat).set_index("t")
 
 
 def _labels(columns: dict[str, Column]) -> dict[str, list]:
-    named: dict[str, list] = {"velocity": ["u", "v", "omega"], "axis": ["x", "y"]}
+    labels: dict[str, list] = {"velocity": ["u", "v", "omega"], "axis": ["x", "y"]}
     sizes = {c.dims[0]: len(c.values) for c in columns.values() if len(c.dims) > 1}
-    return {dim: named.get(dim, [*range(1, size + 1)]) for dim, size in sizes.items()}
+    return {dim: labels.get(dim, [*range(1, size + 1)]) for dim, size in sizes.items()}
 
 
 def hinges(body: Body) -> slice:
