@@ -254,7 +254,7 @@ Axis("x", 3) | Axis("x", (10**400,)) -> values of an axis must be
 multistart(PROBLEM, 1, sampler="x") -> sampler must be one of latin-hypercube
 solve(PROBLEM, 1, output=".") -> output must name a file
 replay(*AT, GAIT, 1e-2, breaks=(float("nan"), 5.0)) -> breaks must be numbers
-replay(*AT, GAIT, 1e-2, instants=10**9) -> at most 10000000
+replay(*AT, GAIT, 1e-2, instants=10**9) -> from 4 to 10000000
 pareto_front(PROBLEM, points=10**9) -> 2 to 1000 points
 Quantity("lambda", "sum(rate**2)") -> a name of its own that is a word
 Problem("x", motion=[]) -> motion must be
@@ -604,7 +604,7 @@ Wave(steepness={}); TINY; 0
 motion({}); (0.0, 0.1, 1.0); (0.1, 1.0), (0.0, 0.5), (0.0, 0.6, 0.6, 1.0)
 motion({}, antipodal=True); (0.0, 0.5); (0.0, 1.0)
 PowerLaw({}); 0, 2; -TINY, 2 + TINY
-replay(*AT, GAIT, 1e-2, instants={}, tolerance=10.0); 4; -2, 0, 2, 3, 5
+replay(*AT, GAIT, 1e-2, instants={}, tolerance=10.0); 4; -2, 0, 2, 3, 4.5
 samples({}); 4; 3
 samples(9, {}); 0.5; -1.0, np.inf
 samples(90, limits={}); 9.0, (9.0, 8.0); 0.0, (1.0, 1.0, 1.0)

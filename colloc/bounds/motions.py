@@ -148,8 +148,8 @@ def two_resting(
             turn = np.exp(1j * np.cumsum(angles[i : j - 1], axis=0))
             across = 1j * np.array(body.lengths[i + 1 : j])[:, None] * turn
             begin = np.concatenate([np.cumsum(across[::-1], axis=0)[::-1], 0 * across[:1]])
-            seen = np.stack([begin.real, begin.imag, np.ones(begin.shape)]).transpose(2, 0, 1)
-            _, size, ways = np.linalg.svd(seen)
+            rows = np.stack([begin.real, begin.imag, np.ones(begin.shape)]).transpose(2, 0, 1)
+            _, size, ways = np.linalg.svd(rows)
             size = np.concatenate([size, np.zeros((len(size), j - i - 3))], axis=1)
             for k in range(2, j - i):
                 moves = size[:, k] < _SINGULAR
@@ -293,11 +293,11 @@ class Domain:
         axis = limit * (2.0 * (np.arange(-1, steps + 1) + shift) / steps - 1.0)
         axis = np.unique(np.clip(axis, -limit, limit))
         grid = np.stack(np.meshgrid(*[axis] * n_joint, indexing="ij"))
-        held = self.holds(grid.reshape(n_joint, -1)).reshape(grid.shape[1:])
-        shapes = [grid[:, held]]
+        inside = self.holds(grid.reshape(n_joint, -1)).reshape(grid.shape[1:])
+        shapes = [grid[:, inside]]
         for joint in range(n_joint):
             ends = [np.delete(grid, end, axis=joint + 1) for end in (-1, 0)]
-            holds = [np.delete(held, end, axis=joint) for end in (-1, 0)]
+            holds = [np.delete(inside, end, axis=joint) for end in (-1, 0)]
             for a, b in ((0, 1), (1, 0)):
                 touches = holds[a] & ~holds[b]
                 shapes.append(move_inside(body, ends[b][:, touches], ends[a][:, touches]))
@@ -363,12 +363,12 @@ def near_the_top(
 ) -> np.ndarray:
     """Indices of up to `count` of the largest near `level`, one for each cell of shapes and
     directions."""
-    near = np.flatnonzero(ratio > level - _WINDOW)
-    near = near[np.argsort(-ratio[near])]
-    angles, rates = motion.angles[:, near] / spacing, motion.rates[:, near] * 4.0
+    index = np.flatnonzero(ratio > level - _WINDOW)
+    index = index[np.argsort(-ratio[index])]
+    angles, rates = motion.angles[:, index] / spacing, motion.rates[:, index] * 4.0
     cell = np.concatenate([np.rint(angles), np.rint(rates)]).T
     _, first = np.unique(cell, axis=0, return_index=True)
-    return near[np.sort(first)][:count]
+    return index[np.sort(first)][:count]
 
 
 def climb_from_lattice(

@@ -475,7 +475,7 @@ def compute_bound(domain: Domain, budget: Budget) -> tuple[Bound, Measure]:
     headings = np.repeat(np.arange(12) * (np.pi / 6), chosen.size)
     program = _Program(samples, np.tile(chosen, 12), headings, rng, budget.smoothing)
     spacing, turn = 2.0 * domain.joint_limit / shapes, np.pi / directions
-    seen, quiet, surprise = samples.motion.size, 0, _UNKNOWN
+    n_sample, quiet, surprise = samples.motion.size, 0, _UNKNOWN
     for count in range(1, budget.rounds + 1):
         # a potential that the next climbs will refute need not be exact
         program.settle(float(np.clip(0.1 * surprise, max(_HELD, 0.2 * tolerance), 0.02)))
@@ -491,7 +491,7 @@ def compute_bound(domain: Domain, budget: Budget) -> tuple[Bound, Measure]:
         steps = 0.5 * spacing, 0.5 * turn, _CLIMB_STEPS
         summit = domain.summits(ratio, pooled.take(chosen), *steps, rng, level - _HOPELESS)
         reached = ratio(summit)
-        seen += fresh.size + chosen.size
+        n_sample += fresh.size + chosen.size
         top, best = float(max(reached.max(), values.max())), summit.take(reached.argmax())
         # two rounds in a row, the second on a finer lattice, must find nothing
         surprise = top - level
@@ -512,8 +512,8 @@ def compute_bound(domain: Domain, budget: Budget) -> tuple[Bound, Measure]:
                 program.samples.add(motion.take(more))
         if coarse and surprise < max(_RIPE, tolerance):
             space = space.with_more_knots(program.measure(), budget.intervals)
-            held = Samples(space, program.samples.motion), program.index, program.heading
-            program, quiet, surprise = _Program(*held, rng, budget.smoothing), 0, _UNKNOWN
+            start = Samples(space, program.samples.motion), program.index, program.heading
+            program, quiet, surprise = _Program(*start, rng, budget.smoothing), 0, _UNKNOWN
     proof = (
         "not certified between them"
         if law.associated
@@ -525,14 +525,14 @@ def compute_bound(domain: Domain, budget: Budget) -> tuple[Bound, Measure]:
         floor=program.best.value,
         converged=quiet == 2,
         guaranteed=None,
-        missing=f"sampled at {seen} motions: {proof}",
+        missing=f"sampled at {n_sample} motions: {proof}",
         angles=tuple(best.angles.tolist()),
         rates=tuple(best.rates.tolist()),
         joint_limit=domain.joint_limit,
         intervals=space.spline.intervals,
         harmonics=harmonics,
         coefficients=tuple(free.tolist()),
-        samples=seen,
+        samples=n_sample,
         seconds=time.process_time() - begin,
         graded=space.spline.graded,
         together=budget.together,
@@ -546,12 +546,12 @@ def usual_budget(domain: Domain) -> Budget:
 
 def bound_key(domain: Domain, budget: Budget) -> str:
     """SHA-256 of what a bound depends on."""
-    stated = {
+    parts = {
         "body": fields(domain.body),
         "friction": fields(domain.friction),
         "joint_limit": domain.joint_limit,
     }
-    return statement_hash({"version": VERSION, "domain": stated, "budget": asdict(budget)})
+    return statement_hash({"version": VERSION, "domain": parts, "budget": asdict(budget)})
 
 
 def known_bound(domain: Domain, budget: Budget, cache: Path) -> Bound | None:
@@ -578,8 +578,8 @@ def efficiency_bound(
     warning."""
     domain = Domain(body, friction, float(joint_limit))
     budget = budget or usual_budget(domain)
-    if cache is not None and (known := known_bound(domain, budget, Path(cache))) is not None:
-        return known
+    if cache is not None and (bound := known_bound(domain, budget, Path(cache))) is not None:
+        return bound
     if domain.law.reversible and any(k % 2 == 0 for k in budget.harmonics or ()):
         raise ProblemError(
             "even harmonics do nothing where mu_b = mu_f (reversal in time): name odd ones only."

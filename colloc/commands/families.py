@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from colloc.commands import main as cli
-from colloc.commands.solve import Found, bound_facts, find_family, find_front, save_and_tell
+from colloc.commands.solve import FamilyResult, bound_facts, find_family, find_front, save_and_tell
 from colloc.gaits.gait_fields import fields
 from colloc.gaits.objective import objective_from
 from colloc.gaits.problem import Problem
@@ -69,8 +69,8 @@ def starts_summary(
         ],
     }
     best = [basin.best.start for basin in optima]
-    shown = {"f": facts, "best": best, "objective": problem.objective.name, "most": _MOST_SHOWN}
-    return optima, facts, render("starts.txt", **shown).splitlines()
+    more = {"f": facts, "best": best, "objective": problem.objective.name, "most": _MOST_SHOWN}
+    return optima, facts, render("starts.txt", **more).splitlines()
 
 
 @cli.command(
@@ -252,13 +252,13 @@ def sweep_summary(study: Study, table: StudyTable, path: Path) -> tuple[dict[str
 
 
 def _begin(options: argparse.Namespace, ending: str) -> tuple[ProblemFile, Path, int | None]:
-    stated, problem = cli.read_problem(options)
+    file, problem = cli.read_problem(options)
     table = cli.output_path(options, Path("results") / f"{problem.name}.{ending}")
-    return replace(stated, problem=problem), table, options.starts or stated.starts
+    return replace(file, problem=problem), table, options.starts or file.starts
 
 
-def _end(options: argparse.Namespace, found: Found) -> int:
-    family, facts, lines, saved = found
+def _end(options: argparse.Namespace, result: FamilyResult) -> int:
+    family, facts, lines, saved = result
     cli.tell(options, facts, lines, saved)
     return cli.OK if family.certified else cli.FAILED
 
@@ -280,9 +280,9 @@ def _end(options: argparse.Namespace, found: Found) -> int:
 )
 def pareto(options: argparse.Namespace) -> int:
     first, second = (text and objective_from(text) for text in options.objectives)
-    stated, table, starts = _begin(options, "front.csv")
+    file, table, starts = _begin(options, "front.csv")
     how = {"first": first, "second": second, "points": options.points, "starts": starts}
-    return _end(options, find_front(options, stated, table, **how))
+    return _end(options, find_front(options, file, table, **how))
 
 
 @cli.command(
@@ -296,7 +296,7 @@ def pareto(options: argparse.Namespace) -> int:
     cli.NO_FIGURE,
 )  # fmt: skip
 def steer(options: argparse.Namespace) -> int:
-    stated, table, starts = _begin(options, "steer.json")
+    file, table, starts = _begin(options, "steer.json")
 
     def find(say):
         from colloc.studies.families import steer as find_gaits
@@ -307,7 +307,7 @@ def steer(options: argparse.Namespace) -> int:
         say("the straight gait")
         turns, spot = ([*map(math.radians, each)] for each in (options.turn, options.spot))
         how = {} if starts is None else {"starts": starts}
-        return find_gaits(stated.problem, turns, spot=spot, progress=report, **how)
+        return find_gaits(file.problem, turns, spot=spot, progress=report, **how)
 
     def describe(family, members):
         facts = family.table() | {"efficiency": family.efficiency.tolist()}
@@ -315,4 +315,4 @@ def steer(options: argparse.Namespace) -> int:
         lines = render("steer.txt", members=members, **how).splitlines()
         return json.dumps(facts) + "\n", facts, lines
 
-    return _end(options, find_family(options, stated, table, find, describe))
+    return _end(options, find_family(options, file, table, find, describe))

@@ -261,9 +261,9 @@ def _attribute(option: Option) -> str:
 
 def refuse(options: argparse.Namespace, why: str, *unused: Option) -> None:
     """Raise a `ProblemError` if options that would do nothing are not as by default."""
-    given = [x for x in unused if getattr(options, _attribute(x)) != x[1].get("default", False)]
-    if given:
-        raise ProblemError(f"{why}: leave {', '.join(name for name, _ in given)} out.")
+    useless = [x for x in unused if getattr(options, _attribute(x)) != x[1].get("default", False)]
+    if useless:
+        raise ProblemError(f"{why}: leave {', '.join(name for name, _ in useless)} out.")
 
 
 def read_problem(
@@ -273,23 +273,26 @@ def read_problem(
     of the result `start` as guess."""
     from colloc.gaits.problem_file import read_problem_file
 
-    stated = read_problem_file(options.problem)
-    asked = values(options, *map(_attribute, CHANGES))
-    changes = {name: value for name, value in asked.items() if value is not None}
-    problem = stated.problem.with_(**changes) if changes else stated.problem
+    file = read_problem_file(options.problem)
+    changes = options_given(options, *map(_attribute, CHANGES))
+    problem = file.problem.with_(**changes) if changes else file.problem
     if start is None:
-        return stated, problem
+        return file, problem
     from colloc.results.store import load
 
     gait = load(start).gait
     try:
-        return stated, problem.with_(guess=gait)
+        return file, problem.with_(guess=gait)
     except ProblemError as error:
         raise ProblemError(f"the gait of {start} cannot be the guess: {error}") from None
 
 
 def values(options: argparse.Namespace, *names: str) -> dict[str, Any]:
     return {name: getattr(options, name) for name in names}
+
+
+def options_given(options: argparse.Namespace, *names: str) -> dict[str, Any]:
+    return {name: x for name, x in values(options, *names).items() if x is not None}
 
 
 def quiet(options: argparse.Namespace) -> bool:
@@ -458,17 +461,17 @@ def _spell_out(error: UnicodeError) -> tuple[str | bytes, int]:
 
 @contextlib.contextmanager
 def _short_warnings() -> Iterator[None]:
-    own = OrderWarning, ReadOnlyRunWarning, SlowWarning
+    of_colloc = OrderWarning, ReadOnlyRunWarning, SlowWarning
     with warnings.catch_warnings():
         before = warnings.showwarning
 
         def show(message, category, *where, **more):
-            if issubclass(category, own):
+            if issubclass(category, of_colloc):
                 print(f"colloc: {message}", file=sys.stderr)
             else:
                 before(message, category, *where, **more)
 
-        for category in own:
+        for category in of_colloc:
             once = category is not ReadOnlyRunWarning
             warnings.simplefilter("once" if once else "always", category)
         warnings.showwarning = show

@@ -59,14 +59,14 @@ def disagreement(recorded: Certificate, now: Certificate, tolerance: float = _TO
         return "the file holds no certificate."
     recorded, now = recorded.by_replay, now.by_replay  # without the residual of samples
     for name in {**_ERRORS, "rotation": "", **recorded.values}:
-        stated, value = recorded.numbers[name], now.numbers.get(name, float("nan"))
+        of_file, value = recorded.numbers[name], now.numbers.get(name, float("nan"))
         rounding, error = max(tolerance, _TOLERANCE) * max(abs(value), 1.0), _ERRORS.get(name)
         errors = [each.numbers[error] for each in (recorded, now)] if error else [rounding, 0.0]
-        what = f"the file certifies {name.replace('_', ' ')} {stated:.8f}"
+        what = f"the file certifies {name.replace('_', ' ')} {of_file:.8f}"
         if error and not max(errors) <= _SAME_SIZE * min(errors) + rounding:
             return f"{what} with an error of {errors[0]:.0e}, where {errors[1]:.0e} is found."
-        if not abs(value - stated) <= _AGREEMENT * sum(errors) + 1e-9:
-            return f"{what}, which is off by {stated - value:.1e}."
+        if not abs(value - of_file) <= _AGREEMENT * sum(errors) + 1e-9:
+            return f"{what}, which is off by {of_file - value:.1e}."
     before, after = ({x.name: x.threshold for x in each.checks} for each in (recorded, now))
     if before.keys() != after.keys():
         missing = ", ".join(sorted(before.keys() ^ after.keys()))
@@ -102,10 +102,10 @@ def verify(options: argparse.Namespace) -> int:
         now = now.with_samples(recorded.of_samples)
     complaint = disagreement(recorded, now, options.tolerance)
     dry = solution.dry() if options.dry or recorded.dry is not None else None
-    stated = recorded.dry if dry is not None and not complaint else None
-    if stated and not np.allclose(stated, dry.efficiency, rtol=_TOLERANCE, atol=0):  # type: ignore[union-attr]
+    former = recorded.dry if dry is not None and not complaint else None
+    if former and not np.allclose(former, dry.efficiency, rtol=_TOLERANCE, atol=0):  # type: ignore[union-attr]
         complaint = (
-            f"the file certifies between {stated[0]:.8f} and {stated[1]:.8f} under dry friction, "
+            f"the file certifies between {former[0]:.8f} and {former[1]:.8f} under dry friction, "
             f"which is not what is found."
         )
     good = now.passed and not complaint and solution.success
@@ -117,8 +117,8 @@ def verify(options: argparse.Namespace) -> int:
         "complaint": complaint,
         **({} if dry is None else {"dry": dry.facts()}),
     }
-    shown = {"now": now, "dry": dry, "checks": not options.quiet}
-    text = render("verify.txt", f=facts, solution=solution, **shown)
+    more = {"now": now, "dry": dry, "checks": not options.quiet}
+    text = render("verify.txt", f=facts, solution=solution, **more)
     cli.tell(options, facts | now.facts(), text.splitlines())
     return cli.OK if good else cli.FAILED
 
@@ -172,8 +172,8 @@ def report(options: argparse.Namespace) -> int:
     beside = load(options.beside) if options.beside else None
     path = cli.output_path(options, _output_name(source, options.beside, ".html"))
     reference = read_problem_file(options.problem).reference if options.problem else None
-    stated = stated_robot(solution, **cli.values(options, *_ROBOT))
-    robot = RobotSheet(solution, **stated) if stated else None
+    arguments = stated_robot(solution, **cli.values(options, *_ROBOT))
+    robot = RobotSheet(solution, **arguments) if arguments else None
     table, front, figures = source.with_suffix(".front.csv"), None, list[str]()
     if table.exists():
         front = read_front(table, solution.problem)
@@ -247,13 +247,12 @@ def export(options: argparse.Namespace) -> int:
 
     source = Path(options.result)
     solution = load(source)
-    stated = cli.values(options, "neutral", "scale", "sign", "clamp")
-    stated = {name: values for name, values in stated.items() if values is not None}
-    pulses = options.format == "pulses" or stated
-    servo = Servo(**stated) if pulses else None
+    of_servo = cli.options_given(options, "neutral", "scale", "sign", "clamp")
+    pulses = options.format == "pulses" or of_servo
+    servo = Servo(**of_servo) if pulses else None
     options.format = _ENDINGS.get(options.format)
-    named = source.with_suffix(".pulses.csv") if pulses else source
-    path = cli.output_path(options, named, [*dict.fromkeys(_ENDINGS.values())])
+    beside = source.with_suffix(".pulses.csv") if pulses else source
+    path = cli.output_path(options, beside, [*dict.fromkeys(_ENDINGS.values())])
     names = ("period", "max_speed", "rate", "periods", "ramp", "degrees")
     settings = cli.values(options, *names, "length", "mass", "gravity")
     facts = solution.export(path, **settings, servo=servo) | {"file": str(path)}

@@ -158,7 +158,7 @@ def _known(model: Model | None) -> dict[str, Any]:
 
 
 def _stated_robot(options: argparse.Namespace, model: Model | None) -> dict[str, Any]:
-    robot = {name: x for name in _OF_A_ROBOT if (x := getattr(options, name)) is not None}
+    robot = cli.options_given(options, *_OF_A_ROBOT)
     if not robot:
         return {}
     robot = _known(model) | robot
@@ -212,7 +212,6 @@ def summary_dict(
         answer: "delta program kkt_error",
     }
     other = ("value", "delta", "starts", "on_speed_floor")
-    stated = ("efficiency", "tolerance", "source")
     return {
         "name": problem.name,
         "file": None if path is None else str(path),
@@ -232,7 +231,8 @@ def summary_dict(
         "others": [{name: getattr(each, name) for name in other} for each in solution.others],
         "gait": fields(solution.gait),
         "certificate": certificate.facts() if replayed else None,
-        "reference": reference and {name: getattr(reference, name) for name in stated},
+        "reference": reference
+        and {name: getattr(reference, name) for name in ("efficiency", "tolerance", "source")},
         "bound": bound_facts(bound),
     }
 
@@ -271,7 +271,7 @@ def bound_facts(bound: Bound | None) -> dict | None:
     cli.VERBOSE,
 )
 def solve(options: argparse.Namespace) -> int:
-    stated, problem = cli.read_problem(options, options.start)
+    file, problem = cli.read_problem(options, options.start)
     path = cli.output_path(options, Path("results") / f"{problem.name}.h5")
     from colloc.bounds.optimality_gap import gap_line, upper_bound
     from colloc.studies.solve import resume, save_and_clear
@@ -293,10 +293,10 @@ def solve(options: argparse.Namespace) -> int:
         )
     with cli.status_line(options) as line:
         solution = resume(
-            replace(stated, problem=problem),
+            replace(file, problem=problem),
             path,
             # a gait that is given on the command line is to be improved
-            starts=options.starts or (1 if options.start else stated.starts),
+            starts=options.starts or (1 if options.start else file.starts),
             progress=lambda news: line.say(f"{problem.name}: {news}"),
             **cli.values(options, "seconds", "search", "fresh"),
         )
@@ -313,8 +313,8 @@ def solve(options: argparse.Namespace) -> int:
             if options.bound:
                 line.say("computing an upper bound on every gait")
             bound = upper_bound(problem, path.parent, compute=options.bound and ended)
-        facts = summary_dict(solution, path if saved else None, stated.reference, bound)
-        lines = summary_lines(solution, stated.reference, verbose=options.verbose)
+        facts = summary_dict(solution, path if saved else None, file.reference, bound)
+        lines = summary_lines(solution, file.reference, verbose=options.verbose)
         gap = gap_line(problem, solution.measured.efficiency, bound, asked=options.bound)
         if not options.json:
             cli.tell(options, facts, [*lines, gap], records)
@@ -335,7 +335,7 @@ def solve(options: argparse.Namespace) -> int:
             with complaining("no front"):
                 how = {"best": solution, "starts": options.starts or OPTIONS.reach_starts}
                 table = path.with_suffix(".front.csv")
-                _, facts["front"], lines, more = find_front(options, stated, table, **how)
+                _, facts["front"], lines, more = find_front(options, file, table, **how)
                 records += more
                 if not options.json:
                     cli.tell(options, facts, lines, more)
@@ -384,22 +384,22 @@ def identify(options: argparse.Namespace) -> int:
     names = ("period", "harmonics", "degrees", "length", "mu_forward")
     with cli.status_line(options) as line:
         line.say(f"{problem.name}: identifying friction")
-        found = identify_friction(problem, options.gait, **cli.values(options, *names))
-    cli.tell(options, found.facts(), [f"{problem.name}: {found.message}", str(found)])
+        result = identify_friction(problem, options.gait, **cli.values(options, *names))
+    cli.tell(options, result.facts(), [f"{problem.name}: {result.message}", str(result)])
     return cli.OK
 
 
-Found = tuple[Any, dict[str, Any], list[str], list[Saved]]
+FamilyResult = tuple[Any, dict[str, Any], list[str], list[Saved]]
 """A family, facts about it, lines for people, and what is saved."""
 
 
 def find_family(
     options: argparse.Namespace,
-    stated: ProblemFile,
+    file: ProblemFile,
     table: Path,
     find: Callable[[Callable[..., None]], Any],
     describe: Callable[[Any, dict[Path, Solution]], tuple[str, dict[str, Any], list[str]]],
-) -> Found:
+) -> FamilyResult:
     """Find a family, save its members and its table, and draw it.
 
     `find` is called with what shows progress. From the family and its members by their paths
@@ -407,7 +407,7 @@ def find_family(
     """
     from colloc.studies.solve import checkpoints_in
 
-    members, saved, name = dict[Path, Solution](), list[Saved](), stated.problem.name
+    members, saved, name = dict[Path, Solution](), list[Saved](), file.problem.name
     with checkpoints_in(table.with_suffix("")):
         with cli.status_line(options) as line:
 
@@ -416,11 +416,11 @@ def find_family(
                 line.say(f"{name}: {what}{value or ''}")
 
             family = find(say)
-        named = {f"{k:02d}": point for k, point in enumerate(family.points)}
+        members_by_name = {f"{k:02d}": point for k, point in enumerate(family.points)}
         if spot := getattr(family, "on_the_spot", None):
-            named |= {f"spot_{k:02d}": point for k, point in enumerate(spot.points)}
-        for stem, solution in named.items():
-            solution.source = stated.source
+            members_by_name |= {f"spot_{k:02d}": point for k, point in enumerate(spot.points)}
+        for stem, solution in members_by_name.items():
+            solution.source = file.source
             saved += (one := save_result(solution, table.with_suffix("") / f"{stem}.h5"))
             members[one[0].path] = solution
         content, facts, lines = describe(family, members)
@@ -435,7 +435,9 @@ def find_family(
     return family, facts | {"file": str(table)}, [f"{name}: {lines[0]}", *lines[1:], last], saved
 
 
-def find_front(options: argparse.Namespace, stated: ProblemFile, table: Path, **how: Any) -> Found:
+def find_front(
+    options: argparse.Namespace, file: ProblemFile, table: Path, **how: Any
+) -> FamilyResult:
     """Find, save and draw a front, by arguments of `colloc.pareto_front`."""
     from colloc.studies.families import pareto_front
 
@@ -444,17 +446,17 @@ def find_front(options: argparse.Namespace, stated: ProblemFile, table: Path, **
             say(f"gait {k} of the front", point)
 
         say("the ends of the front")
-        return pareto_front(stated.problem, **how, progress=report)
+        return pareto_front(file.problem, **how, progress=report)
 
-    return find_family(options, stated, table, find, _front_table)
+    return find_family(options, file, table, find, _front_table)
 
 
 def _front_table(
     front: ParetoFront, members: dict[Path, Solution]
 ) -> tuple[str, dict[str, Any], list[str]]:
-    (names, shown), gaps = front.in_units, {gap.after: gap for gap in front.gaps}
+    (names, in_units), gaps = front.in_units, {gap.after: gap for gap in front.gaps}
     aims, rows = [aim.expression for aim in front.objectives], list[dict[str, Any]]()
-    every = zip(members.items(), front.values.tolist(), shown.tolist(), strict=True)
+    every = zip(members.items(), front.values.tolist(), in_units.tolist(), strict=True)
     for k, ((path, point), values, numbers) in enumerate(every):
         both = zip((*aims, *names), (*values, *numbers), strict=True)
         rows.append(
@@ -472,6 +474,6 @@ def _front_table(
         "points": rows,
         "gaps": [asdict(gap) for gap in front.gaps],
     }
-    table: Any = {"names": names, "shown": shown.tolist(), "gaps": gaps}
+    table: Any = {"names": names, "shown": in_units.tolist(), "gaps": gaps}
     text = render("front.txt", front=front, members=members, **table)
     return content.getvalue(), facts, text.splitlines()

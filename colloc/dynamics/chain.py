@@ -102,9 +102,9 @@ def momenta_at(
     if library is not None:
         moving = Moving(body, friction, angles, rates, delta, None)
         n_time, spin = states.shape[1], body.inertia_column()
-        found = np.empty((N_OUT, n_time)), np.empty((N_OUT, columns, n_time))
-        call_for_all(library.colloc_momenta, moving, spin, froude, states, columns, *found)
-        return found
+        outputs = np.empty((N_OUT, n_time)), np.empty((N_OUT, columns, n_time))
+        call_for_all(library.colloc_momenta, moving, spin, froude, states, columns, *outputs)
+        return outputs
     evaluate = _momenta_function(body, friction, differentiated=True)
     out, slopes = evaluate(angles, rates, states, delta, froude)
     by_output = slopes.full().reshape(N_OUT, -1, states.shape[1])
@@ -202,8 +202,6 @@ def torque_function(body: Chain, friction: Law) -> Any:
 
 @lru_cache(maxsize=32)
 def _torques_and_slopes(body: Chain, friction: Law) -> Any:
-    """CasADi function as `torque_function`, to the torques and their derivatives along all but
-    delta."""
     import casadi as ca
 
     function = torque_function(body, friction)
@@ -222,8 +220,8 @@ def torques_at(
     n, n_time, library = body.n_joint, y.shape[1], native_kernel(body, friction)
     angles, rates, accelerations, states, froude = np.split(y, [n, 2 * n, 3 * n, len(y) - 1])
     if library is None:
-        given = angles, rates, accelerations, states, delta, froude
-        torques, slopes = _torques_and_slopes(body, friction)(*given)
+        arguments = angles, rates, accelerations, states, delta, froude
+        torques, slopes = _torques_and_slopes(body, friction)(*arguments)
         return torques.full(), slopes.full().reshape(n, -1, n_time)
     moving = Moving(body, friction, angles, rates, delta, None)
     slopes = np.empty((n, len(y), n_time)) if differentiated else None

@@ -68,10 +68,10 @@ class CompiledPeriod:
 
     def _call(self, name: str, shapes: Shapes, *arguments: object) -> None:
         pace = np.full(self._n_point, shapes.pace, dtype=float)
-        given = [
+        converted = [
             np.ascontiguousarray(each) if isinstance(each, np.ndarray) else each
             for each in (*shapes[:3], pace, *arguments)
         ]
-        motion = *given[:3], *self._mesh, *given[3:]
+        motion = *converted[:3], *self._mesh, *converted[3:]
         if getattr(self._library, name)(*self._chain, *motion):
             raise MemoryError("no memory for the links of a body.")

@@ -51,22 +51,23 @@ class Admissible(NamedTuple):
     def member(self, parameters: np.ndarray) -> AnyGait:
         shape, static = np.split(parameters, [self.n_shape])
         gait = self.gait.member(shape, self.n_joint)
-        values = zip(self.static, static, strict=True)
-        stated = {each.name: float(value) for each, value in values if not np.isnan(value)}
-        return replace(gait, **stated) if stated else gait
+        pairs = zip(self.static, static, strict=True)
+        values = {each.name: float(value) for each, value in pairs if not np.isnan(value)}
+        return replace(gait, **values) if values else gait
 
     def parameters(self, gait: AnyGait) -> np.ndarray:
         """Parameters of the member nearest to a gait; NaN for a heading that it does not state, or
         states for another phase than that of the class."""
-        near = self.gait.through(gait)
-        source = gait if gait.is_series else near
-        stated = {each.name: getattr(source, each.name) for each in self.static}
-        kept = stated.get("theta") is not None and self.gait.is_synchronous(near)
+        member = self.gait.through(gait)
+        source = gait if gait.is_series else member
+        values = {each.name: getattr(source, each.name) for each in self.static}
+        in_phase = values.get("theta") is not None and self.gait.is_synchronous(member)
         static = []
         for name, lower, upper, guess in self.static:
-            known = kept if name == "theta" else stated[name] is not None
-            static.append(np.clip(stated[name], lower, upper) if known else guess)
-        return np.append(self.gait.project(near) if kept else self.gait.parameters(near), static)
+            has_value = in_phase if name == "theta" else values[name] is not None
+            static.append(np.clip(values[name], lower, upper) if has_value else guess)
+        shape = self.gait.project(member) if in_phase else self.gait.parameters(member)
+        return np.append(shape, static)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         lower, upper = self.gait.bounds(self.body, widest(self.joint_limit))
@@ -154,5 +155,4 @@ def control_problem(problem: Problem) -> ControlProblem:
 
 
 def _size(aim: Objective, unit: float) -> float:
-    """Factor of an objective for coefficients `unit` times as large."""
     return unit ** (aim.degree or 0.0)

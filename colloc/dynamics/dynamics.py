@@ -82,7 +82,7 @@ class Trajectory(NamedTuple):
     """Static parameters, ``(n_static,)``."""
     now: BalancedMotion
     """Per time over the shapes' unit."""
-    held: np.ndarray
+    exist: np.ndarray
     """Points where the equations hold, ``(n_point,)``."""
     slopes: Callable[[], tuple[np.ndarray, np.ndarray]]
     """Derivatives of (tail velocity, velocity of the centre, power, rates of states) along (angles,
@@ -151,23 +151,23 @@ class QuasiStatic:
         mesh: Mesh,
         shapes: Shapes,
         static: np.ndarray,
-        near_states: np.ndarray | None = None,
-        near_z: np.ndarray | None = None,
+        states_guess: np.ndarray | None = None,
+        z_guess: np.ndarray | None = None,
     ) -> Trajectory:
         """Motion along a mesh, from states and tail velocities to start from."""
         body, at = self.body, (self.law, shapes.angles, shapes.rates, shapes.delta)
-        solved = body.solve(*at, start=near_z, tolerance=_TOLERANCE)
-        if near_z is None and solved.converged.all():
+        solved = body.solve(*at, start=z_guess, tolerance=_TOLERANCE)
+        if z_guess is None and solved.converged.all():
             followed = on_one_branch(body, *at, solved.z)
             if followed is not solved.z:
                 solved = body.solve(*at, start=followed, tolerance=_TOLERANCE)
 
         def slopes() -> tuple[np.ndarray, np.ndarray]:
-            found = motion_and_derivatives(body, *at, solved)[1]
-            return found, found[:, :0]
+            rows = motion_and_derivatives(body, *at, solved)[1]
+            return rows, rows[:, :0]
 
-        held = solved.residual < _BALANCED
-        return Trajectory(static, body.motion(*at, solved), held, slopes)
+        exist = solved.residual < _BALANCED
+        return Trajectory(static, body.motion(*at, solved), exist, slopes)
 
     def instants(self, shapes: Shapes, theta: np.ndarray, z: np.ndarray | None = None) -> Instants:
         """Instants for formulas, at orientations ``(n,)`` and tail velocities ``(3, n)``, by
@@ -180,24 +180,24 @@ class QuasiStatic:
         joints = self.joint_map
         return Instants(body, *at, z=z, unit=shapes.unit, load=load, joint_map=joints)
 
-    def totals(self, passed: PeriodTotals) -> dict[str, float]:
+    def totals(self, cycle: PeriodTotals) -> dict[str, float]:
         """Totals of a whole period; those but the rotation are linear but for the direction of
         travel."""
-        gradients = self.total_gradients(passed).items()
-        found = {
-            name: float((np.conj(each.side) * passed.displacement).real + each.work * passed.work)
+        gradients = self.total_gradients(cycle).items()
+        totals = {
+            name: float((np.conj(each.side) * cycle.displacement).real + each.work * cycle.work)
             for name, each in gradients
         }
-        return found | {"rotation": passed.rotation + self.turn}
+        return totals | {"rotation": cycle.rotation + self.turn}
 
-    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
+    def total_gradients(self, cycle: PeriodTotals) -> dict[str, TotalGradient]:
         """Gradients of `totals`."""
-        along = np.exp(1j * heading(self.symmetry, passed.displacement, passed.rotation))
+        along = np.exp(1j * heading(self.symmetry, cycle.displacement, cycle.rotation))
         side = self.periods * chord_per_way(self.turn) * along
         # the axis turns with the solved part
         turns = 0.5 if self.symmetry == ANTIPODAL else 0.0
         return {
-            "distance": TotalGradient(side, turns * (passed.displacement * np.conj(side)).imag),
+            "distance": TotalGradient(side, turns * (cycle.displacement * np.conj(side)).imag),
             "work": TotalGradient(work=self.periods),
             "rotation": TotalGradient(rotation=1.0),
         }
@@ -300,10 +300,10 @@ class OnSlope(QuasiStatic):
         mesh: Mesh,
         shapes: Shapes,
         static: np.ndarray,
-        near_states: np.ndarray | None = None,
-        near_z: np.ndarray | None = None,
+        states_guess: np.ndarray | None = None,
+        z_guess: np.ndarray | None = None,
     ) -> Trajectory:
-        z = np.zeros((3, mesh.n_point)) if near_z is None else near_z
+        z = np.zeros((3, mesh.n_point)) if z_guess is None else z_guess
         at = shapes.angles, shapes.rates, shapes.delta
         now: Any = None
 
@@ -317,16 +317,16 @@ class OnSlope(QuasiStatic):
             return Rates(turns, shapes.pace * now.on_theta[None, None, OMEGA], balanced)
 
         solve = self.equations(mesh, shapes.unit).solve
-        states, _, held = solve(rates, static, near_states, monotone=True)
+        states, _, exist = solve(rates, static, states_guess, monotone=True)
         slopes = now.on_shape, now.on_theta[:, None]
-        return Trajectory(static, now.now, np.full(mesh.n_point, held), lambda: slopes, states)
+        return Trajectory(static, now.now, np.full(mesh.n_point, exist), lambda: slopes, states)
 
-    def totals(self, passed: PeriodTotals) -> dict[str, float]:
+    def totals(self, cycle: PeriodTotals) -> dict[str, float]:
         """Totals; NaN where the joints brake."""
-        found = super().totals(passed)
-        return found if found["work"] > 0 else dict.fromkeys(found, np.nan)
+        totals = super().totals(cycle)
+        return totals if totals["work"] > 0 else dict.fromkeys(totals, np.nan)
 
-    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
+    def total_gradients(self, cycle: PeriodTotals) -> dict[str, TotalGradient]:
         ahead = np.exp(1j * self.regime.ahead)
         return {
             "distance": TotalGradient(ahead),
@@ -373,88 +373,88 @@ class Inertial(QuasiStatic):
     def _n_period(self) -> int:
         return int(self.regime.free is not None)
 
-    def totals(self, passed: PeriodTotals) -> dict[str, float]:
-        timed = {"period": float(np.exp(passed.static[0]))} if self._n_period else {}
-        return self.slow.totals(passed) | timed
+    def totals(self, cycle: PeriodTotals) -> dict[str, float]:
+        timed = {"period": float(np.exp(cycle.static[0]))} if self._n_period else {}
+        return self.slow.totals(cycle) | timed
 
-    def total_gradients(self, passed: PeriodTotals) -> dict[str, TotalGradient]:
-        found = self.slow.total_gradients(passed)
+    def total_gradients(self, cycle: PeriodTotals) -> dict[str, TotalGradient]:
+        gradients = self.slow.total_gradients(cycle)
         if self._n_period:
-            found["period"] = TotalGradient(static=float(np.exp(passed.static[0])))
-        return found
+            gradients["period"] = TotalGradient(static=float(np.exp(cycle.static[0])))
+        return gradients
 
     def simulate(
         self,
         mesh: Mesh,
         shapes: Shapes,
         static: np.ndarray,
-        near_states: np.ndarray | None = None,
-        near_z: np.ndarray | None = None,
+        states_guess: np.ndarray | None = None,
+        z_guess: np.ndarray | None = None,
     ) -> Trajectory:
-        if near_states is None:
+        if states_guess is None:
             slow = self.slow.simulate(mesh, shapes, static[self._n_period :])
             posture = self.chain.posture(shapes.angles)
             link = self.chain.velocity(posture, shapes.rates, slow.now.z)
             at_first = momenta(self.chain, posture, link)
-            near_states = np.concatenate([at_first, slow.states]) if slow.states.size else at_first
-        solve = self._periodic_states if near_z is None else self._newton
-        states, out, held = solve(mesh, shapes, near_states, static)
+            states_guess = np.concatenate([at_first, slow.states]) if slow.states.size else at_first
+        solve = self._periodic_states if z_guess is None else self._newton
+        states, out, exist = solve(mesh, shapes, states_guess, static)
         z, centre, power, rates = np.split(out, [3, 5, 6])
         now = BalancedMotion(z, centre, power[0], power[0])
-        gained, edges = self.equations(mesh, shapes.unit).integrals(rates)
-        edges = edges + (states[_MOMENTA, :1] - gained[:, :1])
+        increments, edges = self.equations(mesh, shapes.unit).integrals(rates)
+        edges = edges + (states[_MOMENTA, :1] - increments[:, :1])
 
         def slopes() -> tuple[np.ndarray, np.ndarray]:
             """A free pace has a column after the momenta: a longer period changes them by more."""
             froude, k = self.froude_at(shapes, static), 2 * self.chain.n_joint
-            found = momenta_at(self.chain, self.law, shapes[:3], states[_MOMENTA], froude)
-            out, slopes = self._with_pull(*found, states, froude)
+            outputs = momenta_at(self.chain, self.law, shapes[:3], states[_MOMENTA], froude)
+            out, slopes = self._with_pull(*outputs, states, froude)
             on_pace = np.zeros((len(out), self._n_period, out.shape[1]))
             on_pace[_MORE] = 2.0 * (out[_MORE] - turning(z, states[_MOMENTA]))[:, None]
             return slopes[:, :k], np.concatenate([slopes[:, k:], on_pace], axis=1)
 
-        return Trajectory(static, now, np.full(mesh.n_point, held), slopes, states, edges)
+        return Trajectory(static, now, np.full(mesh.n_point, exist), slopes, states, edges)
 
     def _periodic_states(
-        self, mesh: Mesh, shapes: Shapes, near: np.ndarray, static: np.ndarray
+        self, mesh: Mesh, shapes: Shapes, guess: np.ndarray, static: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
         """Periodic states, outputs, and whether they exist. Where Newton's method fails from
-        `near`, by continuation through more viscous friction, in steps that shrink where it fails
+        `guess`, by continuation through more viscous friction, in steps that shrink where it fails
         again, as where wheel after wheel slips."""
-        found, delta, ratio = self._newton(mesh, shapes, near, static), shapes.delta, _WETTER
-        while not found[-1] and delta * shapes.unit <= _VISCOUS:
+        solution, delta, ratio = self._newton(mesh, shapes, guess, static), shapes.delta, _WETTER
+        while not solution[-1] and delta * shapes.unit <= _VISCOUS:
             delta *= _WETTER
-            found = self._newton(mesh, shapes._replace(delta=delta), near, static)
-        while found[-1] and delta > shapes.delta:
+            solution = self._newton(mesh, shapes._replace(delta=delta), guess, static)
+        while solution[-1] and delta > shapes.delta:
             drier = max(delta / ratio, shapes.delta)
-            further = self._newton(mesh, shapes._replace(delta=drier), found[0], static)
+            further = self._newton(mesh, shapes._replace(delta=drier), solution[0], static)
             if not further[-1] and ratio > _LEAST_RATIO:
                 ratio **= 0.5
             else:
-                found, delta, ratio = further, drier, min(ratio**2, _WETTER)
-        return found
+                solution, delta, ratio = further, drier, min(ratio**2, _WETTER)
+        return solution
 
     def _newton(
-        self, mesh: Mesh, shapes: Shapes, near: np.ndarray, static: np.ndarray
+        self, mesh: Mesh, shapes: Shapes, guess: np.ndarray, static: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        out, first = near, np.append(near[_MOMENTA, 0], static[self._n_period :])
+        out, first = guess, np.append(guess[_MOMENTA, 0], static[self._n_period :])
         froude, equations = self.froude_at(shapes, static), self.equations(mesh, shapes.unit)
         library = None if self.slow.states else native_kernel(self.chain, self.law)
         if library is not None:
             moving = Moving(self.chain, self.law, *shapes[:3], None)
-            begun = np.column_stack([near, first])
+            begun = np.column_stack([guess, first])
             return kernel_repeating(library, moving, begun, froude, equations.scheme)
 
         def rates(states: np.ndarray) -> Rates:
             nonlocal out
-            out, found = self._rates(shapes, states, froude)
-            return found
+            out, now = self._rates(shapes, states, froude)
+            return now
 
-        states, _, held = equations.solve(rates, first, near)
-        return states, out, held
+        states, _, exist = equations.solve(rates, first, guess)
+        return states, out, exist
 
     def solve_intervals(
-        self, mesh: Mesh, shapes: Shapes, along: Trajectory, begins: np.ndarray, near: np.ndarray
+        self, mesh: Mesh, shapes: Shapes, along: Trajectory, begins: np.ndarray, guess: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Outputs and final states of every interval from initial states ``(n_state, n)``, sought
         near states at the points; and whether they exist, ``(n,)``."""
@@ -464,8 +464,8 @@ class Inertial(QuasiStatic):
             some = shapes._replace(angles=shapes.angles[:, of], rates=shapes.rates[:, of])
             return self._rates(some, states, froude)[1]
 
-        states, ends, found = equations.solve_intervals(rates, begins, near)
-        return self._rates(shapes, states, froude)[0], ends, found
+        states, ends, exist = equations.solve_intervals(rates, begins, guess)
+        return self._rates(shapes, states, froude)[0], ends, exist
 
     def _rates(self, shapes: Shapes, states: np.ndarray, froude: float) -> tuple[np.ndarray, Rates]:
         at = self.chain, self.law, shapes[:3], states[_MOMENTA], froude
@@ -475,8 +475,6 @@ class Inertial(QuasiStatic):
     def _with_pull(
         self, out: np.ndarray, slopes: np.ndarray, states: np.ndarray, froude: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Outputs with the weight's pull, and derivatives along the orientation after the
-        momenta."""
         for theta in states[len(STATES) :]:
             pull: Any = self.regime.pull(theta[None]) / froude  # type: ignore[operator]
             out[_MORE][:2] += pull
@@ -516,7 +514,7 @@ def efficiency_at(
     mesh: Mesh,
     delta: float,
     froude: float = 0.0,
-    near: np.ndarray | None = None,
+    guess: np.ndarray | None = None,
 ) -> tuple[float, np.ndarray | None]:
     """Efficiency of a gait in the motion in which all cycles are alike, and its states at the
     points of a mesh whose neighbours share no stage, sought near others or those of the slow
@@ -525,8 +523,8 @@ def efficiency_at(
     kind = Inertial if froude else QuasiStatic
     angles, rates = gait(mesh.times)
     shapes = Shapes(angles, rates, delta)
-    along = kind(body, friction, Regime(froude=froude)).simulate(mesh, shapes, np.empty(0), near)
-    if not along.held.all():
+    along = kind(body, friction, Regime(froude=froude)).simulate(mesh, shapes, np.empty(0), guess)
+    if not along.exist.all():
         raise NotConvergedError(
             f"at a Froude number of {froude:g} no motion was found in which all cycles are alike."
         )
@@ -591,20 +589,19 @@ def slow_enough(
             f"under {law.label} the pace is part of every gait: how slow is slow enough has no one "
             f"answer."
         )
-    known = np.nan
+    froude = np.nan
     for intervals in _INTERVALS * 2 ** np.arange(_DOUBLED):
         edges = np.union1d(np.linspace(0.0, 1.0, intervals + 1), np.asarray(breaks, dtype=float))
         mesh = Mesh(scheme(SCHEME), edges)
-        before, known = known, _froude(chain, law, gait, mesh, delta, loss)
-        if abs(known - before) < _ACCURACY * known:
-            return known
+        before, froude = froude, _froude(chain, law, gait, mesh, delta, loss)
+        if abs(froude - before) < _ACCURACY * froude:
+            return froude
     raise NotConvergedError(
         "finer and finer meshes do not agree on what inertia does to this gait; try a larger delta."
     )
 
 
 def _froude(body: Chain, friction: Law, gait: Path, mesh: Mesh, delta: float, loss: float) -> float:
-    """Froude number at which inertia first changes the efficiency by the part `loss`."""
     at_pace = body, friction, gait, mesh, delta
     slow, states = efficiency_at(*at_pace)
     # the change is a power of the Froude number where both are small

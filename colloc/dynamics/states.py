@@ -74,7 +74,7 @@ class CollocatedStates:
         self,
         rates: Callable[[np.ndarray], Rates],
         start: np.ndarray,
-        near: np.ndarray | None = None,
+        guess: np.ndarray | None = None,
         *,
         monotone: bool = False,
     ) -> tuple[np.ndarray, np.ndarray, bool]:
@@ -83,11 +83,11 @@ class CollocatedStates:
         the next one, with the same derivatives, is shorter, as residuals of momenta may grow on the
         way under steep friction; or, `monotone`, if residuals fall, where rates are not known
         everywhere, as on slopes. `start` ``(n_state,)`` is the begin (of free states a guess),
-        `near` a guess of the states."""
+        `guess` one of the states."""
         start = np.array(start, dtype=float)
-        if near is None:
-            near = np.repeat(start[:, None], self._b.size, axis=1)
-        x = np.column_stack([near, start])
+        if guess is None:
+            guess = np.repeat(start[:, None], self._b.size, axis=1)
+        x = np.column_stack([guess, start])
         now, residual, off = self._residual(rates, x)
         next_step, trusted, astray = np.zeros_like(x), np.inf, 0
         for _ in range(_STEPS):
@@ -139,14 +139,14 @@ class CollocatedStates:
     def first_order_change(self, on_states: np.ndarray, rates: np.ndarray) -> np.ndarray:
         """Change of the states ``(n_state, n_point)`` where their rates change by so much, from the
         rates' derivatives `on_states` ``(n_state, n_state, n_point)``."""
-        gained, edges = self.integrals(rates)
-        return -self._linear(on_states).solve(np.column_stack([-gained, edges[:, -1]]))[:, :-1]
+        increments, edges = self.integrals(rates)
+        return -self._linear(on_states).solve(np.column_stack([-increments, edges[:, -1]]))[:, :-1]
 
     def solve_intervals(
         self,
         rates: Callable[[np.ndarray, np.ndarray], Rates],
         begins: np.ndarray,
-        near: np.ndarray,
+        guess: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """States of every interval by itself from begins ``(n_state, n)``; its ends ``(n_state,
         n)``; convergence ``(n,)``. `rates` are those of states at points of such indices."""
@@ -157,12 +157,12 @@ class CollocatedStates:
         ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
             now = rates(states.reshape(k, -1), (s * of[:, None] + np.arange(s)).ravel())
             value = now.value.reshape(k, -1, s)
-            gained = np.einsum("nij,anj->ani", self._a[of], value)
-            left_over = states - begins[:, of, None] - gained
+            increments = np.einsum("nij,anj->ani", self._a[of], value)
+            left_over = states - begins[:, of, None] - increments
             off = np.abs(left_over).max(axis=(0, 2))
             return value, left_over, now.on_states.reshape(k, k, -1, s), off
 
-        states, share, open_ = near.reshape(k, n, s).copy(), np.ones(n), np.arange(n)
+        states, share, open_ = guess.reshape(k, n, s).copy(), np.ones(n), np.arange(n)
         value, left_over, slopes, off = residual(states, open_)
         for _ in range(_MOST_ITERATIONS):
             open_ = open_[off[open_] >= _CLOSED]
@@ -194,9 +194,9 @@ class CollocatedStates:
         """Rates, residuals at the points and (of free states) at the end, and the largest."""
         states, start = x[:, :-1], x[:, -1]
         now = rates(states)
-        gained, edges = self.integrals(now.value)
+        increments, edges = self.integrals(now.value)
         closing = edges[:, -1] + (start - self._image @ start)
-        residual = np.column_stack([states - start[:, None] - gained, closing])
+        residual = np.column_stack([states - start[:, None] - increments, closing])
         off = max(
             np.abs(residual[:, :-1]).max(), np.abs(residual[:, -1][self._free]).max(initial=0.0)
         )
@@ -273,21 +273,22 @@ class _Linear:
     @_FAR
     def solve(self, residual: np.ndarray) -> np.ndarray:
         """Solution at the points and at the begin, ``(k, n_point + 1)``."""
-        own, k = self._within(residual[:, :-1]), len(residual)
-        gained = np.einsum("nai,mni->na", self._gain, self._by_interval(own))
-        right = np.append(np.where(self._free, residual[:, -1], 0.0), gained)
+        apart, k = self._within(residual[:, :-1]), len(residual)
+        ends = np.einsum("nai,mni->na", self._gain, self._by_interval(apart))
+        right = np.append(np.where(self._free, residual[:, -1], 0.0), ends)
         edges = self._edges.solve(right).reshape(-1, k)
         more = self._by_point(np.einsum("nia,na->ni", self._response, edges[:-1]))[0]
-        return np.column_stack([own + more, edges[0]])
+        return np.column_stack([apart + more, edges[0]])
 
     def vjp(self, of_states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`CollocatedStates.vjp`: along the rates it is ``H'(I - H R)'^-1``."""
-        (n, s, k), given = self._shape, self._by_interval(of_states)
-        right = np.zeros((len(given), n + 1, k))
-        right[:, :-1] = np.einsum("mni,nia->mna", given, self._response)
+        (n, s, k), by_interval = self._shape, self._by_interval(of_states)
+        right = np.zeros((len(by_interval), n + 1, k))
+        right[:, :-1] = np.einsum("mni,nia->mna", by_interval, self._response)
         edges = self._edges.solve(right.reshape(-1, (n + 1) * k).T, "T").T.reshape(right.shape)
-        later, given = edges[:, 1:], given + np.einsum("mna,nai->mni", edges[:, 1:], self._gain)
-        stages = np.einsum("mni,nij->mnj", given, self._inverse).reshape(-1, n, s, k)
+        later = edges[:, 1:]
+        at_stages = by_interval + np.einsum("mna,nai->mni", later, self._gain)
+        stages = np.einsum("mni,nij->mnj", at_stages, self._inverse).reshape(-1, n, s, k)
         on_rates = np.einsum("mnia,nij->mnja", stages, self._a)
         on_rates += self._b[:, :, None] * later[:, :, None]
         on_start = np.where(self._free, 0.0, edges[:, 0])

@@ -120,7 +120,6 @@ class Corners(GaitFunction):
 
     @cached_property
     def _whole(self) -> tuple[np.ndarray, np.ndarray]:
-        """Phases and vertices of the whole path, whose second half is the image of the first."""
         phases, half = self.phases, self.vertices
         if self.symmetry == NONE:
             return phases, half
@@ -474,8 +473,8 @@ class Basis(LinearClass):
         spline = make_interp_spline(phases, closed, _DEGREE, bc_type="periodic")
 
         def residual(every):
-            kept = np.append(np.arange(0, n, every), n)
-            coarse = make_interp_spline(phases[kept], closed[kept], _DEGREE, bc_type="periodic")
+            knots = np.append(np.arange(0, n, every), n)
+            coarse = make_interp_spline(phases[knots], closed[knots], _DEGREE, bc_type="periodic")
             return float(np.abs(coarse(phases) - closed).max() / largest)
 
         # the error falls from each halving of the step to the next by about the same factor
@@ -553,8 +552,6 @@ def _check_columns(columns: str | os.PathLike[str] | Sequence[Any]) -> tuple:
 
 
 def _read(path: Path) -> list[np.ndarray]:
-    """Columns of a file after its first, even times of a cycle; a last line that repeats the first
-    is dropped."""
     _, table = csv_table(path, _FEWEST)
     steps = np.diff(table[:, 0])
     if steps.min() <= 0 or np.ptp(steps) > _EVEN * steps.mean():

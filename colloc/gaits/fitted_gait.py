@@ -237,7 +237,6 @@ class _Samples(NamedTuple):
             raise ProblemError(what)
 
     def best_fit(self, period: float | None, harmonics: int | None) -> _Fit:
-        """The fit of the fewest numbers that scores about as well as any."""
         self.check(period, harmonics)
         end, step = self.time[-1], self.step
 

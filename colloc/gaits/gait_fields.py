@@ -49,8 +49,8 @@ def check_kind(name: str, value: Any, kinds: Sequence[type], answers: Any = None
         raise ProblemError(
             f"{name}: a {what} does not say its {', '.join(lacks)} ({answers.__module__})."
         )
-    known = " or ".join(kind.__name__ for kind in kinds)
-    raise ProblemError(f"{name} must be a {known}, not {what}.")
+    names = " or ".join(kind.__name__ for kind in kinds)
+    raise ProblemError(f"{name} must be a {names}, not {what}.")
 
 
 def fields(value: Any) -> dict[str, Any]:
@@ -79,9 +79,9 @@ def _revive(value: Any) -> Any:
     return value
 
 
-def part_from(kinds: Sequence[type], stated: dict[str, Any]) -> Any:
+def part_from(kinds: Sequence[type], statement: dict[str, Any]) -> Any:
     """The part that `fields` described. KeyError, TypeError or ProblemError if it did not."""
-    values = dict(stated)
+    values = dict(statement)
     name = values.pop(KIND)
     # of one defined again the last
     kind = next((kind for kind in reversed(kinds) if kind.__name__ == name), None)
@@ -90,8 +90,8 @@ def part_from(kinds: Sequence[type], stated: dict[str, Any]) -> Any:
     return kind(**{name: _revive(value) for name, value in values.items()})
 
 
-def gait_from(stated: dict[str, Any]) -> AnyGait:
-    return part_from(GAITS, stated)
+def gait_from(statement: dict[str, Any]) -> AnyGait:
+    return part_from(GAITS, statement)
 
 
 def kinds_of_parts() -> dict[str, list[type]]:
@@ -100,6 +100,6 @@ def kinds_of_parts() -> dict[str, list[type]]:
     return usual | {"motion": MOTIONS, "robot": [Robot]}
 
 
-def statement_hash(stated: Any) -> str:
+def statement_hash(statement: Any) -> str:
     """SHA-256 of plain numbers, strings, lists and dictionaries."""
-    return hashlib.sha256(json.dumps(stated, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(statement, sort_keys=True).encode()).hexdigest()

@@ -301,7 +301,6 @@ def shift_phase(gait: Fourier, phase: float) -> Fourier:
 
 @lru_cache(maxsize=64)
 def _series_basis(harmonics: int, symmetry: str, n_joint: int) -> np.ndarray:
-    """Parameters to the table of a series, ``(n_joint (2 K + 1), n_parameter)``."""
     columns, n_function = [], 2 * harmonics + 1
     for function, joint in product(range(n_function), range(n_joint)):
         harmonic, sine = (function + 1) // 2, function > 0 and function % 2 == 0
@@ -387,7 +386,6 @@ class Serpenoid(Harmonic):
 
     @property
     def _waves(self) -> list[tuple[int, bool]]:
-        """Harmonic of each amplitude, and whether it is that of a sine."""
         waves = [(1, True)]
         for k in range(2, self.harmonics + 1):
             if self.symmetry == ANTIPODAL and k % 2 == 0:

@@ -131,7 +131,6 @@ class LinearClass:
         return np.eye(n_joint * self.functions(np.zeros(1)).shape[0])
 
     def _basis(self, n_joint: int) -> np.ndarray:
-        """B ``(n_joint * n_function, n_parameter)``: from parameters to tables."""
         return _symmetric_tables(self, n_joint)
 
     def _check_symmetry(self) -> None:

@@ -86,16 +86,16 @@ class Objective:
                 f"{', '.join(QUANTITIES)}."
             )
         try:
-            stated = formula(NAMED.get(self.expression, self.expression), self._names)
+            expression = formula(NAMED.get(self.expression, self.expression), self._names)
         except (ProblemError, TypeError) as error:
             known = f"It may be one of {', '.join(NAMED)}, or a formula like 'distance / work'."
             raise ProblemError(f"objective: {error} {known}") from None
         names = {expression: name for name, expression in NAMED.items()}
-        object.__setattr__(self, "expression", stated.text)
-        object.__setattr__(self, "name", self.name or names.get(stated.text, stated.text))
+        object.__setattr__(self, "expression", expression.text)
+        object.__setattr__(self, "name", self.name or names.get(expression.text, expression.text))
         if not self.uses:
             raise ProblemError(
-                f"the objective {stated.text!r} uses no quantity of a gait; it may use "
+                f"the objective {expression.text!r} uses no quantity of a gait; it may use "
                 f"{', '.join(self._names)}."
             )
         try:
@@ -238,26 +238,28 @@ _SHORT = {
 EFFICIENCY, SPEED, TURNING, DRIVEN, TOWING = (Objective(name) for name in NAMED)
 
 
-def objective_from(stated: object) -> Objective:
+def objective_from(statement: object) -> Objective:
     """An objective by itself, its name, its expression, or its `fields`."""
-    if isinstance(stated, Objective):
-        return stated
-    if isinstance(stated, dict):
+    if isinstance(statement, Objective):
+        return statement
+    if isinstance(statement, dict):
         return Objective(
-            **stated | {"quantities": [Quantity(**each) for each in stated.get("quantities", ())]}
+            **statement
+            | {"quantities": [Quantity(**each) for each in statement.get("quantities", ())]}
         )
-    return Objective(stated)  # type: ignore[arg-type]
+    return Objective(statement)  # type: ignore[arg-type]
 
 
-def least_values(stated: object) -> tuple[tuple[Objective, float], ...]:
+def least_values(statement: object) -> tuple[tuple[Objective, float], ...]:
     """Objectives and their least values, from a mapping or pairs; the largest one of each."""
-    pairs = stated.items() if isinstance(stated, Mapping) else () if stated is None else stated
+    pairs = statement.items() if isinstance(statement, Mapping) else statement
+    pairs = () if pairs is None else pairs
     if not isinstance(pairs, Iterable) or not all(
         isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in pairs
     ):
         raise ProblemError(
             f"at_least must map objectives to required values, as {{'distance': 0.3}}, not "
-            f"{shown(stated)}."
+            f"{shown(statement)}."
         )
     values: dict[str, tuple[Objective, float]] = {}
     for what, least in pairs:

@@ -80,8 +80,8 @@ def parameters(problem: Problem) -> list[Parameter]:
             add("width", chain.width, "width", partial(_scale, chain.width))
         _add_feet(feet, chain.n_link, mirrored, add)
     for field, words in _NUMBERS.items():
-        if stated := getattr(problem, field):
-            add(words, _first(stated), field, partial(_scale, stated))
+        if value := getattr(problem, field):
+            add(words, _first(value), field, partial(_scale, value))
     for k, (aim, least) in enumerate(problem.at_least):
         if least:
             add(f"least {aim.name}", least, "at_least", partial(_scale_least, problem.at_least, k))
@@ -91,8 +91,8 @@ def parameters(problem: Problem) -> list[Parameter]:
 
 
 def _coefficients(law: Law) -> list[tuple[str, float]]:
-    stated = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
-    return [(field, float(stated[field])) for field in COEFFICIENTS if is_number(stated.get(field))]
+    values = {field.name: getattr(law, field.name) for field in fields(law)}  # type: ignore[arg-type]
+    return [(field, float(values[field])) for field in COEFFICIENTS if is_number(values.get(field))]
 
 
 def _add_links(chain: Chain, mirrored: bool, add: Callable[..., None]) -> None:
@@ -146,14 +146,14 @@ def _feet_alike(feet: tuple[Foot, ...], n_link: int, mirrored: bool) -> list[dic
     return groups
 
 
-def _scale(stated: Any, by: float) -> Any:
-    if isinstance(stated, tuple):
-        return tuple(_scale(each, by) for each in stated)
-    return stated * (1 + by)
+def _scale(value: Any, by: float) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_scale(each, by) for each in value)
+    return value * (1 + by)
 
 
-def _first(stated: Any) -> float:
-    return _first(stated[0]) if isinstance(stated, tuple) else abs(float(stated))
+def _first(value: Any) -> float:
+    return _first(value[0]) if isinstance(value, tuple) else abs(float(value))
 
 
 def _scale_least(at_least: Sequence[Any], which: int, by: float) -> tuple[Any, ...]:
@@ -180,7 +180,6 @@ def _change_shares(shares: Sequence[float], which: Sequence[int], by: float) -> 
 
 
 def _count_from(what: str, which: Sequence[int]) -> str:
-    """ "link 2" or "links 1 and 3", counted from 1 at the tail."""
     *others, last = (str(k + 1) for k in which)
     many = {"foot": "feet"}.get(what, f"{what}s")
     return f"{many} {', '.join(others)} and {last}" if others else f"{what} {last}"

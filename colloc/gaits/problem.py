@@ -200,8 +200,7 @@ class Problem:
             )
         check_kind("body", self.body, gait_fields.BODIES, Body)
         stages, usual, n_joint = schedule(self.body), self.body.defaults, self.body.n_joint
-        own = Prescribed(stages, self.body.symmetries[0]) if stages else Harmonic()
-        self._fill(gait=own)
+        self._fill(gait=Prescribed(stages, self.body.symmetries[0]) if stages else Harmonic())
         check_name(self.name)
         check_kind("friction", self.friction, gait_fields.LAWS, Law)
         check_kind("gait", self.gait, gait_fields.CLASSES, LinearClass)
@@ -328,9 +327,9 @@ class Problem:
                 f"no {self.gait.symmetry} gait turns the body: rotation must be 0, or the class "
                 f"without symmetry."
             )
-        asked = self.objective != EFFICIENCY or self.at_least or self.speed_limit is not None
-        asked = asked or self.least_distance is not None
-        if asked and not self.gait.free:
+        has_aims = self.objective != EFFICIENCY or self.at_least or self.speed_limit is not None
+        has_aims = has_aims or self.least_distance is not None
+        if has_aims and not self.gait.free:
             raise ProblemError(
                 "nothing is free in a prescribed motion; leave objective, at_least and "
                 "speed_limit out."
@@ -508,8 +507,8 @@ class Problem:
 
     def with_(self, **changes: object) -> Problem:
         """A copy with some fields changed, validated anew."""
-        stated = {name: getattr(type(self), name) for name in self.derived_fields} | changes
-        return dataclasses.replace(self, **stated)
+        values = {name: getattr(type(self), name) for name in self.derived_fields} | changes
+        return dataclasses.replace(self, **values)
 
     @property
     def without_robot(self) -> Problem:
@@ -541,7 +540,7 @@ class Problem:
         }
 
     @classmethod
-    def from_dict(cls, stated: dict) -> Problem:
+    def from_dict(cls, statement: dict) -> Problem:
         """The problem that `to_dict` wrote.
 
         Raises
@@ -551,11 +550,11 @@ class Problem:
         """
         try:
             parts = {
-                name: gait_fields.part_from(kinds, stated[name])
+                name: gait_fields.part_from(kinds, statement[name])
                 for name, kinds in gait_fields.kinds_of_parts().items()
-                if name in stated or name not in ("motion", "robot")
+                if name in statement or name not in ("motion", "robot")
             }
-            return cls(**stated | parts)
+            return cls(**statement | parts)
         except ProblemError:
             raise
         except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
@@ -574,5 +573,5 @@ def _retraces(problem: Problem) -> bool:
     if not gaits.free:
         return False
     rates = gaits.angle_matrix(gaits.instants, n_joint, 1)
-    drawn = np.random.default_rng(0).normal(size=rates.shape[2])
-    return bool(np.linalg.matrix_rank(rates @ drawn) <= 1)
+    direction = np.random.default_rng(0).normal(size=rates.shape[2])
+    return bool(np.linalg.matrix_rank(rates @ direction) <= 1)

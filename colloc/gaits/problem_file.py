@@ -97,8 +97,8 @@ def load_problem(path: str | os.PathLike[str]) -> Problem:
 
 
 def problem_file_text(problem: Problem) -> str:
-    stated = pprint.pformat(problem.to_dict(), sort_dicts=False, width=100)
-    return f"from colloc import Problem\n\nPROBLEM = Problem.from_dict(\n{stated}\n)\n"
+    text = pprint.pformat(problem.to_dict(), sort_dicts=False, width=100)
+    return f"from colloc import Problem\n\nPROBLEM = Problem.from_dict(\n{text}\n)\n"
 
 
 def _too_long(what: str, size: int) -> str:

@@ -109,22 +109,28 @@ def read_record(
     does not name a unit. With a `body` markers at its ends and joints tell them, too."""
     table = read_table(path)
     check_size(path, table, FEWEST)
-    columns, clock, joints, how = _columns(path, table, n_joint, body)
-    time, unit = _times(path, table, clock)
-    rows, notes = _rows(path, table, time, clock, joints)
+    try:
+        return _record(table, n_joint, degrees, body)
+    except ProblemError as error:
+        raise ProblemError(f"{path}: {error}") from None
+
+
+def _record(table: Table, n_joint: int, degrees: bool, body: Chain | None) -> Record:
+    columns, clock, joints, how = _columns(table, n_joint, body)
+    time, unit = _times(table, clock)
+    rows, notes = _rows(table, time, clock, joints)
     if re.search(r"^#\s*ramp_s:", table.preamble, re.M):
         rows = rows[time[rows] >= 0]
         notes.append("lead-in before time 0 ignored")
     time = time[rows]
     if (falls := np.flatnonzero(np.diff(time) < 0)).size:
         raise ProblemError(
-            f"{path}: the times{' in the first column' * (not columns)} fall after line "
+            f"the times{' in the first column' * (not columns)} fall after line "
             f"{table.lines[rows[falls[0]]]}: give one record, its lines in the order of time."
         )
     if time[-1] == time[0]:
         raise ProblemError(
-            f"{path}: all times are {time[0]:g}: give a column of times that rise, or none for "
-            f"equal steps."
+            f"all times are {time[0]:g}: give a column of times that rise, or none for equal steps."
         )
     raw, places = table.values[rows][:, [c.at for c in joints]].T, None
     time, even = _even_steps(time, raw)
@@ -138,11 +144,11 @@ def read_record(
         notes.append(f"of {len(table.lines)} rows, the first {rows.size} in steps of {every} taken")
     if body is not None and joints[0].kind == "place":
         units = np.ones(n_joint)
-        raw, places, length = _from_markers(path, raw.reshape(-1, 2, rows.size), body)
+        raw, places, length = _from_markers(raw.reshape(-1, 2, rows.size), body)
         how = f"{how}, {length:.4g} of them a body length,"
     else:
-        units = _units(path, table, joints, degrees)
-        _check_size_of_angles(path, joints, raw, units)
+        units = _units(table, joints, degrees)
+        _check_size_of_angles(joints, raw, units)
     angles = np.unwrap(raw * units[:, None], discont=1.5 * np.pi, axis=1)
     angles -= 2 * np.pi * np.round(angles.mean(axis=1, keepdims=True) / (2 * np.pi))
     if turned := _names(joints, np.abs(angles - raw * units[:, None]).max(axis=1) > 1.0):
@@ -154,8 +160,8 @@ def read_record(
     facts = [f"read {n_joint} joint{plural} {how} from {_ends(joints)}"]
     facts[0] += f", {angle_unit}" if places is None else ""
     facts += [f"time {unit}{even}", *table.notes, *notes]
-    stated = re.search(r"^#\s*period_s:\s*([\d.eE+-]+)\s*$", table.preamble, re.M)
-    period = float(stated[1]) if stated and unit == "in s" else None
+    comment = re.search(r"^#\s*period_s:\s*([\d.eE+-]+)\s*$", table.preamble, re.M)
+    period = float(comment[1]) if comment and unit == "in s" else None
     of_time = re.search(r"in (\w*?)(s|secs?|seconds?)$", unit)
     second = _SECOND.get(of_time[1]) if of_time else None
     centres = (angles.max(axis=1) + angles.min(axis=1)) / np.pi
@@ -176,14 +182,14 @@ def _ends(columns: list[Column]) -> str:
 
 
 def _columns(
-    path: Path, table: Table, n_joint: int, body: Chain | None
+    table: Table, n_joint: int, body: Chain | None
 ) -> tuple[list[Column], list[Column], list[Column], str]:
     """All named columns; those of times, if any; those of the joints, and how they are known."""
     if not table.names:
         width = table.values.shape[1]
         unnamed = [Column(j, f"column {j + 1}") for j in range(width)]
         if width not in (n_joint, n_joint + 1):
-            _refuse_count(path, width - 1, n_joint)
+            _refuse_count(width - 1, n_joint)
         clock, joints = unnamed[: width - n_joint], unnamed[width - n_joint :]
         return [], clock, joints, "in the file's order, as it has no names"
     both = zip(table.names, table.units, strict=True)
@@ -207,19 +213,16 @@ def _columns(
     numeric = np.isfinite(table.values).any(axis=0)
     left = [c for c in columns if c not in clock]
     may_be = [c for c in left if numeric[c.at]] or left
-    return columns, clock, *_joints(path, may_be, n_joint, body)
+    return columns, clock, *_joints(may_be, n_joint, body)
 
 
-def _joints(
-    path: Path, columns: list[Column], n_joint: int, body: Chain | None
-) -> tuple[list[Column], str]:
+def _joints(columns: list[Column], n_joint: int, body: Chain | None) -> tuple[list[Column], str]:
     angles = [c for c in columns if c.kind == "angle"]
     places = [c for c in columns if c.kind == "place"]
     if not angles and places and body is not None:
-        return _markers(path, places, n_joint + 2), "from positions of points"
+        return _markers(places, n_joint + 2), "from positions of points"
     if not angles and places:
         _refuse(
-            path,
             f"its columns {_ends(places)} look like positions of points of the body; write joint "
             f"angles, each the direction of a link less that of the link behind it",
         )
@@ -238,47 +241,42 @@ def _joints(
         if "#" in key or (not key and n_joint > 1):
             numbered.append(sorted(each, key=lambda c: (c.numbers, c.words)))
             if len({c.words for c in each}) < len(each):
-                _refuse(path, f"two columns are called {each[0].name}")
+                _refuse(f"two columns are called {each[0].name}")
     full = [each for each in numbered if len(each) == n_joint]
     if len(full) > 1:
         sides = f"{_ends(full[0])}, and {_ends(full[1])}"
-        _refuse(
-            path, f"two sets of columns may be the {n_joint} joints, {sides}; leave one of them out"
-        )
+        _refuse(f"two sets of columns may be the {n_joint} joints, {sides}; leave one of them out")
     of_links = full and full[0][0].last("link") and "joint" not in full[0][0].words
     if full and not of_links:
         return full[0], "by name"
     if links := full or [each for each in numbered if len(each) == n_joint + 1]:
         _refuse(
-            path,
             f"{_ends(links[0])} are {len(links[0])} columns of angles, and the body has {n_joint} "
             "joints; if they are directions of links, write what each has beyond the one behind it",
         )
     if len(angles) != n_joint:
-        _refuse_count(path, len(angles), n_joint)
+        _refuse_count(len(angles), n_joint)
     in_order = all(each == [c for c in angles if c in each] for each in numbered)
     if not in_order or any(c.last("end") for c in angles):
-        _refuse(path, f"the order of the columns {', '.join(c.name for c in angles)} is not clear")
+        _refuse(f"the order of the columns {', '.join(c.name for c in angles)} is not clear")
     return angles, "in the file's order, tail to head,"
 
 
-def _markers(path: Path, columns: list[Column], n_point: int) -> list[Column]:
+def _markers(columns: list[Column], n_point: int) -> list[Column]:
     sides = [
         sorted((c for c in columns if axis in c.words), key=lambda c: c.numbers) for axis in "xy"
     ]
     x, y = ([c.numbers for c in side] for side in sides)
     if x != y or len({*x}) < len(x) or len(x) != n_point:
         raise ProblemError(
-            f"{path}: its columns {_ends(columns)} are x of {len(x)} points and y of {len(y)}; a "
+            f"its columns {_ends(columns)} are x of {len(x)} points and y of {len(y)}; a "
             f"body of {n_point - 1} links has {n_point} points, its ends and joints: call them "
             f"x_1, y_1 (the tail), x_2, ..."
         )
     return [c for pair in zip(*sides, strict=True) for c in pair]
 
 
-def _from_markers(
-    path: Path, places: np.ndarray, body: Chain
-) -> tuple[np.ndarray, np.ndarray, float]:
+def _from_markers(places: np.ndarray, body: Chain) -> tuple[np.ndarray, np.ndarray, float]:
     """Joint angles that points ``(n_link + 1, 2, n_time)`` tell, the path of the centre of mass and
     the tail in body lengths, and the body length in the unit of the points."""
     points = places[:, 0] + 1j * places[:, 1]
@@ -289,7 +287,7 @@ def _from_markers(
     if not off.max() <= _ASTRAY:
         k = int(off.argmax())
         raise ProblemError(
-            f"{path}: points {k + 1} and {k + 2} are {lengths[k] / length:.3g} of the body apart, "
+            f"points {k + 1} and {k + 2} are {lengths[k] / length:.3g} of the body apart, "
             f"and that link is {body.lengths[k]:.3g} long: points must be at the ends and joints, "
             f"from tail to head."
         )
@@ -299,19 +297,18 @@ def _from_markers(
     return angles, np.stack([path_of.real, path_of.imag], axis=1), length
 
 
-def _refuse_count(path: Path, count: int, n_joint: int) -> NoReturn:
+def _refuse_count(count: int, n_joint: int) -> NoReturn:
     _refuse(
-        path,
         f"it has {count} column{'s' * (count != 1)} of angles, and the body has {n_joint} "
         f"joint{'s' * (n_joint != 1)}; write a column of times, then one for each joint",
     )
 
 
-def _refuse(path: Path, what: str) -> NoReturn:
-    raise ProblemError(f"{path}: {what}: call columns of joints joint_1 (at the tail), joint_2 ...")
+def _refuse(what: str) -> NoReturn:
+    raise ProblemError(f"{what}: call columns of joints joint_1 (at the tail), joint_2 ...")
 
 
-def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, str]:
+def _times(table: Table, clock: list[Column]) -> tuple[np.ndarray, str]:
     if not clock:
         samples = np.arange(len(table.lines), dtype=float)
         return samples, "in equal steps, a sample each, as no column holds it"
@@ -331,7 +328,7 @@ def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, s
                 stamps.append(np.nan)
         if np.isnan(stamps[0]):
             raise ProblemError(
-                f"{path}, line {table.lines[0]}: the time {table.cells[0][column.at]!r} is no "
+                f"line {table.lines[0]}: the time {table.cells[0][column.at]!r} is no "
                 f"number, and no date and time as 2026-01-31T12:00:00.05: write seconds."
             )
         time = np.array(stamps) - stamps[0]
@@ -346,7 +343,7 @@ def _times(path: Path, table: Table, clock: list[Column]) -> tuple[np.ndarray, s
 
 
 def _rows(
-    path: Path, table: Table, time: np.ndarray, clock: list[Column], joints: list[Column]
+    table: Table, time: np.ndarray, clock: list[Column], joints: list[Column]
 ) -> tuple[np.ndarray, list[str]]:
     needed = [c.at for c in (*clock[:1], *joints)]
     together = np.vstack([time, table.values[:, needed[-len(joints) :]].T])
@@ -355,13 +352,13 @@ def _rows(
         if not is_blank(cell := table.cells[k][j := needed[i]]):
             name = table.names[j] if table.names else j + 1
             raise ProblemError(
-                f"{path}, line {table.lines[k]}, column {name}: {cell[:40]!r} is no number: mend "
+                f"line {table.lines[k]}, column {name}: {cell[:40]!r} is no number: mend "
                 f"it, or leave the line out."
             )
     rows, blank = np.flatnonzero(whole), int((~whole).sum())
     if 2 * rows.size < whole.size or rows.size < FEWEST:
         raise ProblemError(
-            f"{path}: only {rows.size} of {whole.size} lines have a number in each column needed "
+            f"only {rows.size} of {whole.size} lines have a number in each column needed "
             f"(line {table.lines[int(np.argmin(whole))]} has not), and {FEWEST} must: write all "
             f"joints in every line."
         )
@@ -388,40 +385,38 @@ def _even_steps(time: np.ndarray, raw: np.ndarray) -> tuple[np.ndarray, str]:
     return line, f", stamps rounded to {unit:.3g} taken as equal steps of {step:.4g}"
 
 
-def _units(path: Path, table: Table, joints: list[Column], degrees: bool) -> np.ndarray:
+def _units(table: Table, joints: list[Column], degrees: bool) -> np.ndarray:
     """Radians per unit of each joint's column ``(n_joint,)``."""
-    stated = []
+    units = []
     for column in joints:
         if unread := column.last("unit not read"):
             raise ProblemError(
-                f"{path}: the column {column.name} holds {unread}: write degrees or radians, and "
+                f"the column {column.name} holds {unread}: write degrees or radians, and "
                 f"say so in its name."
             )
-        stated.append(next((_ANGLES[w] for w in reversed(column.words) if w in _ANGLES), 0.0))
-    if degrees and 1.0 in stated:
+        units.append(next((_ANGLES[w] for w in reversed(column.words) if w in _ANGLES), 0.0))
+    if degrees and 1.0 in units:
         raise ProblemError(
-            f"{path}: the column {joints[stated.index(1.0)].name} holds radians: leave out "
+            f"the column {joints[units.index(1.0)].name} holds radians: leave out "
             f"--degrees (degrees=True)."
         )
     degrees |= bool(re.search(r"in_?degrees\s*=\s*yes|angles are in degrees", table.preamble, re.I))
-    if not degrees and 0.0 in stated and max(stated) > 0.0:
-        silent, other = joints[stated.index(0.0)].name, joints[stated.index(max(stated))].name
+    if not degrees and 0.0 in units and max(units) > 0.0:
+        silent, other = joints[units.index(0.0)].name, joints[units.index(max(units))].name
         raise ProblemError(
-            f"{path}: the column {other} says its unit, and {silent} does not: call it "
+            f"the column {other} says its unit, and {silent} does not: call it "
             f"{silent}_deg or {silent}_rad."
         )
-    return np.array([unit or (_DEGREE if degrees else 1.0) for unit in stated])
+    return np.array([unit or (_DEGREE if degrees else 1.0) for unit in units])
 
 
-def _check_size_of_angles(
-    path: Path, joints: list[Column], raw: np.ndarray, units: np.ndarray
-) -> None:
+def _check_size_of_angles(joints: list[Column], raw: np.ndarray, units: np.ndarray) -> None:
     largest = np.abs(raw).max(axis=1)
     worst = int((largest * units).argmax())
     name, most = joints[worst].name, largest[worst]
     if most > 360 and raw.min() >= 0:
         raise ProblemError(
-            f"{path}: {name} goes up to {most:.4g}, like ticks or pulses of a servo: write "
+            f"{name} goes up to {most:.4g}, like ticks or pulses of a servo: write "
             f"degrees, such as (ticks - 512) * 300 / 1023 or (ticks - 2048) * 360 / 4096 for "
             f"Dynamixel, and (microseconds - 1500) * 0.09 for pulses."
         )
@@ -429,10 +424,8 @@ def _check_size_of_angles(
         return
     if not np.isclose(units[worst], _DEGREE):
         raise ProblemError(
-            f"{path} has an angle of {most:.4g} rad ({name}): if angles are degrees, say so "
+            f"it has an angle of {most:.4g} rad ({name}): if angles are degrees, say so "
             f"(degrees=True, --degrees)."
         )
     if most > 720:
-        raise ProblemError(
-            f"{path}: {name} has an angle of {most:.4g} degrees: is it the right column?"
-        )
+        raise ProblemError(f"{name} has an angle of {most:.4g} degrees: is it the right column?")

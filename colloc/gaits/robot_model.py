@@ -76,8 +76,11 @@ class _Part:
     solids: list[tuple[np.ndarray, np.ndarray, int]] = field(default_factory=list)
     """Middle, half axes as columns, and the norm that tells how far they reach: 1 of a box."""
 
+    @property
+    def coefficients(self) -> tuple[float, float]:
+        return (self.friction or [(1.0, 1.0)])[-1]
+
     def reach(self, way: np.ndarray) -> list[float]:
-        """Reach of each solid that way."""
         return [float(x @ way + np.linalg.norm(way @ axes, n)) for x, axes, n in self.solids]
 
 
@@ -150,8 +153,8 @@ def _as_mjcf(root: Element) -> Element:
                 if shape.tag != "box":
                     r, length = (_row(shape, x, "0", of) for x in ("radius", "length"))
                     size = np.append(2 * r, length)
-                stated = {"type": shape.tag, "size": " ".join(map(str, (0.5 * size).tolist()))}
-                SubElement(link, "geom", each.attrib | stated, contype="0", conaffinity="0")
+                attributes = {"type": shape.tag, "size": " ".join(map(str, (0.5 * size).tolist()))}
+                SubElement(link, "geom", each.attrib | attributes, contype="0", conaffinity="0")
                 if use == "collision" and kinds[1] == {"sphere"} < kinds[0] | {"sphere"}:
                     foot = SubElement(link, "body", each.attrib)
                     SubElement(foot, "joint", type="slide", stiffness="1")
@@ -174,10 +177,10 @@ def _parts(root: Element) -> list[_Part]:
     parts: list[_Part] = []
 
     def inherit(default, above):
-        own = above | {x.tag: above.get(x.tag, {}) | x.attrib for x in default}
-        classes[default.get("class", "main")] = own
+        usual = above | {x.tag: above.get(x.tag, {}) | x.attrib for x in default}
+        classes[default.get("class", "main")] = usual
         for each in default.findall("default"):
-            inherit(each, own)
+            inherit(each, usual)
 
     for default in root.findall("default"):
         inherit(default, {})
@@ -193,10 +196,10 @@ def _parts(root: Element) -> list[_Part]:
 
     def frame_of(element, frame, of):
         place, turn = frame
-        own = Rotation.from_quat(np.roll(_row(element, "quat", "1 0 0 0", of), -1))
+        inner = Rotation.from_quat(np.roll(_row(element, "quat", "1 0 0 0", of), -1))
         if element.get("euler"):
-            own = Rotation.from_euler(order, unit * _row(element, "euler", "0 0 0", of))
-        return place + turn @ _row(element, "pos", "0 0 0", of), turn @ own.as_matrix()
+            inner = Rotation.from_euler(order, unit * _row(element, "euler", "0 0 0", of))
+        return place + turn @ _row(element, "pos", "0 0 0", of), turn @ inner.as_matrix()
 
     def grow(body, part, usual, above):
         usual, of = body.get("childclass", usual), f'"{body.get("name")}"'
@@ -259,9 +262,64 @@ def _parts(root: Element) -> list[_Part]:
 
 
 def _chain(parts: list[_Part]) -> Model:
-    carried = {part: [x for x in parts if x.parent is part] for part in parts}
+    up, stand = _contacts(parts)
+    links = _in_series(parts, stand)
+    joints = [b if b.parent is a else a for a, b in pairwise(links)]
+    turns = zip(joints, links[1:], strict=True)
+    signs = [math.copysign(1, x.axis @ up) * (1 if x is b else -1) for x, b in turns]
+    ahead, at = _line(joints, up)
+    at, notes = _with_ends(links, stand, ahead, at)
+    lengths = np.diff(at)
+    # lighter ones are points of contact
+    heavy = [x for x in stand if x.parent and x.mass > _SMALL * x.parent.mass]
+    masses = [math.fsum(x.mass for x in (y, *heavy) if y in (x, x.parent)) for y in links]
+    if min(masses) <= 0:
+        masses = []
+        notes.append("a link has no mass there, so all have weights in proportion to their lengths")
+    for part, a, b in zip(links, at, at[1:], strict=False):
+        if part.mass and abs(part.moment @ ahead / part.mass - 0.5 * (a + b)) > _OFF * (b - a):
+            notes.append(f"the mass of {part.name} is taken to be in its middle, which it is not")
+    feet, directed = list[str](), [x for x in stand if x.kind != "hinge" and _rolls(x)]
+    left, middle = np.cross(up, ahead), joints[0].place
+    for k, part in enumerate(links):
+        rows = []
+        for x in (y for y in stand if y.parent is part):
+            kind, more = _kind_of_foot(x, up, ahead)
+            offset = (x.place - middle) @ left / lengths.sum()
+            more = f", offset={offset:.6g}" * bool(abs(offset) > 1e-6) + more
+            place = (x.place @ ahead - at[k]) / lengths[k]
+            rows.append((round(float(place), 6) + 0.0, kind, more))
+        feet += _feet_of_link(k, sorted(rows), part, ahead, at[k], lengths[k])
+    if all(foot.endswith(", 0.0000, 1.0000)") for foot in feet):
+        feet = []
+    mus = {mu for part in parts for each in part.friction if part not in directed for mu in each}
+    if len(mus) > 1:
+        notes.append(
+            f"its coefficients of friction, from {min(mus):g} to {max(mus):g}, are not used: "
+            f"state --mu"
+        )
+    motors = ([getattr(x, name) for x in joints] for name in ("speed", "torque"))
+    speeds, torques = (most if min(most) > 0 else [] for most in motors)
+    names = [f"{x.joint} = {'-' * (y < 0)}joint_" for x, y in zip(joints, signs, strict=True)]
+    return Model(
+        [round(float(x), 9) for x in lengths],
+        [round(x, 9) for x in masses],
+        [_limits(*both) for both in zip(joints, signs, strict=True)],
+        speeds,
+        torques,
+        ", ".join(f"{name}{j}" for j, name in enumerate(names, 1)),
+        feet,
+        mus.pop() if len(mus) == 1 else None,
+        notes,
+    )
+
+
+def _contacts(parts: list[_Part]) -> tuple[np.ndarray, list[_Part]]:
+    """The axis about which links turn, upwards, and wheels and feet."""
+    carries = {part.parent for part in parts}
     # wheels have neither a limit nor something behind
-    known = {x: (x.limit is not None) + bool(carried[x]) for x in parts[1:] if x.kind == "hinge"}
+    hinges = [part for part in parts[1:] if part.kind == "hinge"]
+    known = {x: (x.limit is not None) + (x in carries) for x in hinges}
     if not known:
         raise ProblemError("no joint of it turns: a chain has hinges between its links.")
     first = max(known, key=lambda part: known[part])
@@ -270,7 +328,7 @@ def _chain(parts: list[_Part]) -> Model:
     for part in parts[1:]:
         cos = abs(float(part.axis @ up))
         what, cure = f'joint "{part.joint}"', "fix it in the file if the robot can hold it"
-        is_foot = part.kind == "slide" and part.sprung and not carried[part]
+        is_foot = part.kind == "slide" and part.sprung and part not in carries
         if is_foot or (known.get(part) == 0 and cos < _SMALL):
             stand.append(part)
         elif part not in known:
@@ -280,7 +338,13 @@ def _chain(parts: list[_Part]) -> Model:
                 f"{what} is {math.degrees(math.acos(cos)):.3g} degrees off the axis of "
                 f'"{first.joint}": a planar chain turns about parallel axes; {cure}.'
             )
-    carried = {part: [x for x in on if x not in stand] for part, on in carried.items()}
+    return up, stand
+
+
+def _in_series(parts: list[_Part], stand: list[_Part]) -> list[_Part]:
+    """The links from tail to head, as far as names tell which is which."""
+    links = [x for x in parts if x not in stand]
+    carried = {part: [x for x in links if x.parent is part] for part in links}
     for part, on in carried.items():
         if len(on) > 1 + (part is parts[0]):
             raise ProblemError(
@@ -296,20 +360,28 @@ def _chain(parts: list[_Part]) -> Model:
     ends = links[0].name.lower(), links[-1].name.lower()
     if any(x in ends[0] for x in ("head", "front")) or any(x in ends[1] for x in ("tail", "rear")):
         links.reverse()
-    joints = [b if b.parent is a else a for a, b in pairwise(links)]
-    turns = zip(joints, links[1:], strict=True)
-    signs = [math.copysign(1, x.axis @ up) * (1 if x is b else -1) for x, b in turns]
+    return links
+
+
+def _line(joints: list[_Part], up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Direction of the straight body, and places of its joints that way."""
     places = np.array([part.place for part in joints]) @ (np.eye(3) - np.outer(up, up))
     span = float(np.linalg.norm(places[-1] - places[0]))
     ahead = (places[-1] - places[0]) / (span or 1.0)
-    left, at = np.cross(up, ahead), places @ ahead
-    off = np.abs((places - places[0]) @ left).max()
+    at, off = places @ ahead, np.abs((places - places[0]) @ np.cross(up, ahead)).max()
     if not span or off > _SMALL * span or np.diff(at).min() <= _SMALL * span:
         raise ProblemError(
             "where all joints are at zero they must lie on a line, each before the next: write "
             "origins so that zero is the straight body."
         )
-    notes = []
+    return ahead, at
+
+
+def _with_ends(
+    links: list[_Part], stand: list[_Part], ahead: np.ndarray, at: np.ndarray
+) -> tuple[np.ndarray, list[str]]:
+    """Places of the joints and both tips, and remarks."""
+    notes, span = list[str](), np.ptp(at)
     for k, side in ((0, -1), (-1, 1)):
         part = links[k]
         tips = [side * float(x.place @ ahead) for x in stand if x.parent is part]
@@ -323,74 +395,51 @@ def _chain(parts: list[_Part]) -> Model:
                 f"or the origin of its mass."
             )
         at = np.insert(at, 0 if k == 0 else at.size, side * max(tips))
-    lengths, wheels = np.diff(at), [x for x in stand if x.kind == "hinge"]
-    # lighter ones are points of contact
-    heavy = [x for x in stand if x.parent and x.mass > _SMALL * x.parent.mass]
-    masses = [math.fsum(x.mass for x in (y, *heavy) if y in (x, x.parent)) for y in links]
-    if min(masses) <= 0:
-        masses = []
-        notes.append("a link has no mass there, so all have weights in proportion to their lengths")
-    for part, a, b in zip(links, at, at[1:], strict=False):
-        if part.mass and abs(part.moment @ ahead / part.mass - 0.5 * (a + b)) > _OFF * (b - a):
-            notes.append(f"the mass of {part.name} is taken to be in its middle, which it is not")
-    limits = []
-    for part, sign in zip(joints, signs, strict=True):
-        low, high = sorted(sign * x for x in part.limit or (-math.pi, math.pi))
-        if not low < 0 < high:
-            raise ProblemError(
-                f'joint "{part.joint}" goes from {low:.4g} to {high:.4g} rad: 0, straight, must be '
-                f"between."
-            )
-        limits.append((max(low, -math.pi), min(high, math.pi)))
-    feet, directed, nodes = list[str](), list[_Part](), np.polynomial.legendre.leggauss(_LINE)[0]
-    for k, part in enumerate(links):
-        rows = []
-        for x in (y for y in stand if y.parent is part):
-            kind, (along, across) = "Foot", (x.friction or [(1.0, 1.0)])[-1]
-            offset = (x.place - places[0]) @ left / lengths.sum()
-            more = f", offset={offset:.6g}" if abs(offset) > 1e-6 else ""
-            if x in wheels or along < _ROLLS * across:
-                kind, rolls = "Wheel", np.cross(x.axis, up) if x in wheels else x.turn[:, 0]
-                angle = math.remainder(math.atan2(rolls @ left, rolls @ ahead), math.pi)
-                more += f", angle={angle:.6g}" if abs(angle) > _SMALL else ""
-                own = f"rolling={along:g}, sideways={across:g}"
-                free = ", rolling={rolling:g}, sideways={mu:g}, axle=True"
-                more += free if x in wheels else f", {own}"
-                directed += [x] if x not in wheels else []
-            place = (x.place @ ahead - at[k]) / lengths[k]
-            rows.append((round(float(place), 6) + 0.0, kind, more))
-        rows.sort()
-        spots = np.array([row[0] for row in rows])
-        if len(rows) == _LINE:
-            middle, half = 0.5 * (spots[0] + spots[-1]), np.ptp(spots) / np.ptp(nodes)
-            if np.allclose(spots, middle + half * nodes, rtol=0, atol=1e-4):
-                rows = []
-                feet.append(f"Pad({k}, {middle - half:.4f}, {middle + half:.4f})")
-        elif not rows:
-            reached = (max(part.reach(way), default=math.inf) for way in (-ahead, ahead))
-            ends = ((np.array([*reached]) * (-1, 1) - at[k]) / lengths[k]).clip(0.0, 1.0)
-            low, high = ends if 0 < np.ptp(ends) < 0.9 else (0.0, 1.0)
-            feet.append(f"Pad({k}, {low:.4f}, {high:.4f})")
-        feet += [f"{kind}({k}, {place:g}{more})" for place, kind, more in rows]
-    if all(foot.endswith(", 0.0000, 1.0000)") for foot in feet):
-        feet = []
-    mus = {mu for part in parts for each in part.friction if part not in directed for mu in each}
-    if len(mus) > 1:
-        notes.append(
-            f"its coefficients of friction, from {min(mus):g} to {max(mus):g}, are not used: "
-            f"state --mu"
+    return at, notes
+
+
+def _limits(joint: _Part, sign: float) -> tuple[float, float]:
+    low, high = sorted(sign * x for x in joint.limit or (-math.pi, math.pi))
+    if not low < 0 < high:
+        raise ProblemError(
+            f'joint "{joint.joint}" goes from {low:.4g} to {high:.4g} rad: 0, straight, must be '
+            f"between."
         )
-    motors = ([getattr(x, name) for x in joints] for name in ("speed", "torque"))
-    speeds, torques = (most if min(most) > 0 else [] for most in motors)
-    names = [f"{x.joint} = {'-' * (y < 0)}joint_" for x, y in zip(joints, signs, strict=True)]
-    return Model(
-        [round(float(x), 9) for x in lengths],
-        [round(x, 9) for x in masses],
-        limits,
-        speeds,
-        torques,
-        ", ".join(f"{name}{j}" for j, name in enumerate(names, 1)),
-        feet,
-        mus.pop() if len(mus) == 1 else None,
-        notes,
-    )
+    return max(low, -math.pi), min(high, math.pi)
+
+
+def _rolls(foot: _Part) -> bool:
+    along, across = foot.coefficients
+    return along < _ROLLS * across
+
+
+def _kind_of_foot(foot: _Part, up: np.ndarray, ahead: np.ndarray) -> tuple[str, str]:
+    """Name of its function in Python, and arguments."""
+    is_wheel = foot.kind == "hinge"
+    if not is_wheel and not _rolls(foot):
+        return "Foot", ""
+    way = np.cross(foot.axis, up) if is_wheel else foot.turn[:, 0]
+    angle = math.remainder(math.atan2(way @ np.cross(up, ahead), way @ ahead), math.pi)
+    along, across = foot.coefficients
+    more = f", angle={angle:.6g}" * (abs(angle) > _SMALL)
+    if is_wheel:
+        return "Wheel", more + ", rolling={rolling:g}, sideways={mu:g}, axle=True"
+    return "Wheel", more + f", rolling={along:g}, sideways={across:g}"
+
+
+def _feet_of_link(
+    k: int, rows: list[Any], part: _Part, ahead: np.ndarray, begin: float, length: float
+) -> list[str]:
+    """Feet of link k as Python, from rows of (place, kind, arguments): Gauss points are a pad, and
+    so is what a link without feet lies on."""
+    spots, nodes = np.array([row[0] for row in rows]), np.polynomial.legendre.leggauss(_LINE)[0]
+    if len(rows) == _LINE:
+        middle, half = 0.5 * (spots[0] + spots[-1]), np.ptp(spots) / np.ptp(nodes)
+        if np.allclose(spots, middle + half * nodes, rtol=0, atol=1e-4):
+            return [f"Pad({k}, {middle - half:.4f}, {middle + half:.4f})"]
+    if not rows:
+        reached = (max(part.reach(way), default=math.inf) for way in (-ahead, ahead))
+        ends = ((np.array([*reached]) * (-1, 1) - begin) / length).clip(0.0, 1.0)
+        low, high = ends if 0 < np.ptp(ends) < 0.9 else (0.0, 1.0)
+        return [f"Pad({k}, {low:.4f}, {high:.4f})"]
+    return [f"{kind}({k}, {place:g}{more})" for place, kind, more in rows]

@@ -276,6 +276,6 @@ def warm_start(problem: Any, gait: Any, gait_class: Any, **changes: object) -> A
     """The problem in another class, from a known optimum, with delta as to the shape speed."""
     relative = problem.delta / (1.0 if problem.gait.relative_delta else problem.guess.length)
     delta = relative * (1.0 if gait_class.relative_delta else gait.length)
-    stated = {"gait": gait_class, "delta": delta, "delta_start": _NEAR * delta}
-    stated["guess"] = to_class(problem, gait_class, gait)
-    return problem.with_(**(stated | changes))
+    fields = {"gait": gait_class, "delta": delta, "delta_start": _NEAR * delta}
+    fields["guess"] = to_class(problem, gait_class, gait)
+    return problem.with_(**(fields | changes))

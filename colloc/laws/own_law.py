@@ -378,12 +378,12 @@ def _read_table(table: Any) -> tuple[str, np.ndarray]:
         return name, values
     order = []
     for wanted, others in _NAMES.items():
-        found = [k for k, each in enumerate(names) if each in others]
-        if not found and wanted != "back":
+        columns = [k for k, each in enumerate(names) if each in others]
+        if not columns and wanted != "back":
             raise ProblemError(
                 f"{name} has no column {wanted!r}: its columns are {', '.join(names)}."
             )
-        order += found[:1]
+        order += columns[:1]
     return name, values[:, order]
 
 
@@ -430,11 +430,11 @@ def _fit_all(speed: np.ndarray, coefficients: np.ndarray) -> tuple[float, list[n
     def score(log_speed):
         return sum(_fit_direction(speed, mu, np.exp(log_speed))[0] for mu in coefficients)
 
-    tried = np.log(np.geomspace(speed[speed > 0].min() / _BEYOND, speed.max() * _BEYOND, _SCAN))
-    best = tried[np.argmin([score(s) for s in tried])]
-    step = tried[1] - tried[0]
-    found = scipy.optimize.minimize_scalar(
+    grid = np.log(np.geomspace(speed[speed > 0].min() / _BEYOND, speed.max() * _BEYOND, _SCAN))
+    best = grid[np.argmin([score(s) for s in grid])]
+    step = grid[1] - grid[0]
+    minimum = scipy.optimize.minimize_scalar(
         score, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-10}
     )
-    v_s = float(np.exp(found.x if found.fun < score(best) else best))
+    v_s = float(np.exp(minimum.x if minimum.fun < score(best) else best))
     return v_s, [_fit_direction(speed, mu, v_s)[1] for mu in coefficients]

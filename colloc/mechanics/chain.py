@@ -81,12 +81,12 @@ class Chain(Body):
             "inertias": "",
         }
         for name, whole in wholes.items():
-            given = getattr(self, name)
+            value = getattr(self, name)
             try:
-                values = tuple(float(value) for value in given)
+                values = tuple(float(each) for each in value)
             except (TypeError, ValueError):
                 raise ProblemError(
-                    f"body.{name} must be a sequence of numbers, not {given!r}."
+                    f"body.{name} must be a sequence of numbers, not {value!r}."
                 ) from None
             object.__setattr__(self, name, values)
             if name == "lengths" and len(values) < 2:
@@ -280,8 +280,8 @@ class Chain(Body):
         it lies on them, seen from the tail, ``(2, 2, n_part, n_time)``."""
         contact = self.contact
         cos, sin, x, y = (row[contact.links] for row in self.posture(angles))
-        drawn = [wheel * (part.kind == "wheel") for part in contact.parts]
-        length = np.array(self.lengths)[contact.links] * drawn
+        wheels = [wheel * (part.kind == "wheel") for part in contact.parts]
+        length = np.array(self.lengths)[contact.links] * wheels
         along = contact.length + length[:, None] * contact.cos
         across = length[:, None] * contact.sin
         ends = [

@@ -264,11 +264,11 @@ def crossing_depth(
     if not is_chain(body) or pairs == ():
         return np.zeros(angles.shape[1])
     ends = np.stack(body.joints(angles))
-    near = _within_reach(ends, _pairs_apart(body.n_link, 2)) if pairs is None else list(pairs)
-    depth = _in_blocks(_crossing, ends, near).max(axis=0, initial=0.0)
+    close = _within_reach(ends, _pairs_apart(body.n_link, 2)) if pairs is None else list(pairs)
+    depth = _in_blocks(_crossing, ends, close).max(axis=0, initial=0.0)
     if body.width == 0:
         return depth
-    beside = ends_and_links(body) if pairs is None else _ends_beside(near).reshape(-1, 2)
+    beside = ends_and_links(body) if pairs is None else _ends_beside(close).reshape(-1, 2)
     return _with_width(depth, _gaps(ends, beside).min(axis=0, initial=np.inf), body.width)
 
 
@@ -283,20 +283,20 @@ def passing_depth(body: Any, angles: np.ndarray) -> float:
     if not is_chain(body):
         return 0.0
     ends = np.stack(body.joints(angles))
-    near = _within_reach(ends, _pairs_apart(body.n_link, 2))
-    return float(_in_blocks(_passing, ends, near).max(initial=0.0))
+    close = _within_reach(ends, _pairs_apart(body.n_link, 2))
+    return float(_in_blocks(_passing, ends, close).max(initial=0.0))
 
 
 def overlapping_pairs(ends: np.ndarray, pairs: Sequence[Pair], width: float, least: float) -> Pairs:
     """Pairs of links that overlap, or pass through each other along a path, by more than `least`
     [body lengths]; from the coordinates ``(2, n_link + 1, n_time)`` of joints and tips."""
-    near = _within_reach(ends, pairs, width)
-    depth = _in_blocks(_crossing, ends, near)
+    close = _within_reach(ends, pairs, width)
+    depth = _in_blocks(_crossing, ends, close)
     if width > 0:
-        gaps = [_gaps(ends, beside) for beside in _ends_beside(near)]
+        gaps = [_gaps(ends, beside) for beside in _ends_beside(close)]
         depth = _with_width(depth, np.min(gaps, axis=0), width)
-    deepest = np.maximum(depth.max(axis=1), _in_blocks(_passing, ends, near))
-    return tuple(pair for pair, deep in zip(near, deepest, strict=True) if deep > least)
+    deepest = np.maximum(depth.max(axis=1), _in_blocks(_passing, ends, close))
+    return tuple(pair for pair, deep in zip(close, deepest, strict=True) if deep > least)
 
 
 def _in_blocks(
@@ -304,7 +304,6 @@ def _in_blocks(
     ends: np.ndarray,
     pairs: Sequence[Pair],
 ) -> np.ndarray:
-    """A function of pairs, of so many at once as stay in the cache."""
     size = max(1, _BLOCK // ends.shape[2])
     blocks = (pairs[k : k + size] for k in range(0, max(1, len(pairs)), size))
     return np.concatenate([of_pairs(ends, block) for block in blocks])
@@ -345,8 +344,8 @@ def _passing(ends: np.ndarray, pairs: Sequence[Pair]) -> np.ndarray:
     """Depths ``(n_pair,)`` to which links of pairs pass through each other between times."""
     heights, beside = _seen_ends(ends, pairs)
     through = (heights[..., 1:] * heights[..., :-1] < 0) & beside[..., 1:] & beside[..., :-1]
-    passed = np.minimum(np.abs(heights[..., 1:]), np.abs(heights[..., :-1]))
-    return np.where(through, passed, 0.0).max(axis=(0, 2), initial=0.0)
+    depth = np.minimum(np.abs(heights[..., 1:]), np.abs(heights[..., :-1]))
+    return np.where(through, depth, 0.0).max(axis=(0, 2), initial=0.0)
 
 
 def _seen_ends(ends: np.ndarray, pairs: Sequence[Pair]) -> tuple[np.ndarray, np.ndarray]:
@@ -377,4 +376,4 @@ def _within_reach(ends: np.ndarray, pairs: Sequence[Pair], width: float = 0.0) -
         return _length(apart).min(axis=1, initial=np.inf) <= reach
 
     here = _in_blocks(within, middles, pairs)
-    return [pair for pair, near in zip(pairs, here, strict=True) if near]
+    return [pair for pair, is_close in zip(pairs, here, strict=True) if is_close]

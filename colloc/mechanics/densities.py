@@ -151,8 +151,6 @@ def sample() -> dict[str, Any]:
 
 
 class _OfInstants:
-    """A function of a time point by a formula, the field `_text`."""
-
     _text: str
 
     @property
@@ -196,8 +194,8 @@ class _OfInstants:
             for p in _DOUBLINGS:
                 after = {k: v * 2.0**p if k in scaled else v for k, v in at.items()}
                 powers.append(np.log2(self._formula(after) / before) / p)
-        near = float(np.round(powers[0].flat[0], 6)) + 0.0
-        return near if np.allclose(np.concatenate(powers), near, rtol=0, atol=1e-9) else None
+        degree = float(np.round(powers[0].flat[0], 6)) + 0.0
+        return degree if np.allclose(np.concatenate(powers), degree, rtol=0, atol=1e-9) else None
 
     def _check(self, what: str, rows: tuple[int, ...], instead: str) -> None:
         """Normalise the formula; a `ProblemError` if it has other rows, or no finite value."""
@@ -212,8 +210,8 @@ class _OfInstants:
 
     def fields(self) -> dict[str, Any]:
         """As plain numbers and text (JSON)."""
-        stated: dict[str, Any] = asdict(self)  # type: ignore[call-overload]
-        return {k: list(v) if isinstance(v, tuple) else v for k, v in stated.items()}
+        values: dict[str, Any] = asdict(self)  # type: ignore[call-overload]
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
 
 
 @named_arguments
@@ -280,9 +278,9 @@ INTEGRALS = {each.name: each for each in (LENGTH, DRIVEN_WORK)}
 """Quantities that every objective may speak of."""
 
 
-def quantities_of(asked: Any) -> tuple[Quantity, ...]:
+def quantities_of(quantities: Any) -> tuple[Quantity, ...]:
     """Quantities by their names, or as they are. `ProblemError` for an unknown name."""
-    each = list(asked) if isinstance(asked, Iterable) else [asked]
+    each = list(quantities) if isinstance(quantities, Iterable) else [quantities]
     for one in each:
         if not isinstance(one, Quantity) and one not in INTEGRALS:
             raise ProblemError(
@@ -401,24 +399,24 @@ class PathLimits:
         )
 
 
-def stated_limit(stated: Any) -> PathLimit:
-    if not isinstance(stated, (PathLimit, dict)):
+def stated_limit(statement: Any) -> PathLimit:
+    if not isinstance(statement, (PathLimit, dict)):
         raise ProblemError(
-            f"limits are of the kind PathLimit(name, function, most), not {stated!r}."
+            f"limits are of the kind PathLimit(name, function, most), not {statement!r}."
         )
-    return stated if isinstance(stated, PathLimit) else PathLimit(**stated)
+    return statement if isinstance(statement, PathLimit) else PathLimit(**statement)
 
 
 Limits = Iterable[PathLimit] | PathLimits
 
 
-def limits_of(asked: Limits, n_joint: int) -> PathLimits:
-    if isinstance(asked, PathLimits):
-        return asked
-    return PathLimits(tuple(each.on(n_joint) for each in asked))
+def limits_of(limits: Limits, n_joint: int) -> PathLimits:
+    if isinstance(limits, PathLimits):
+        return limits
+    return PathLimits(tuple(each.on(n_joint) for each in limits))
 
 
 def torque_and_power(torque: tuple[float, ...], power: tuple[float, ...]) -> tuple[PathLimit, ...]:
     """Limits of motors, joint by joint: moments either way, and powers that they deliver."""
-    stated = ("torque", "moment", torque, True), ("power", "power", power, False)
-    return tuple(PathLimit(*each) for each in stated if each[2])
+    rows = ("torque", "moment", torque, True), ("power", "power", power, False)
+    return tuple(PathLimit(*each) for each in rows if each[2])

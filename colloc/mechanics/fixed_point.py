@@ -37,7 +37,7 @@ _SMOOTHER = 2.0
 _AWAY = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
 """Steps by which a balance is followed to a time point, in the time in which velocities change by
 about delta."""
-Found = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+Attempt = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Tail velocity, residual, iterations, anchor, its velocity."""
 
 
@@ -150,8 +150,8 @@ def _reachable(moving: Moving, tolerance: float) -> np.ndarray | float:
 
 def _search(
     moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
-) -> Found:
-    found = _attempt(moving, start, tolerance, max_iterations, "direct")
+) -> Attempt:
+    best = _attempt(moving, start, tolerance, max_iterations, "direct")
     enough, contact = _reachable(moving, tolerance), moving.body.contact
 
     def direct(there, start):
@@ -167,7 +167,7 @@ def _search(
     def guesses():
         # beside a fold, or with feet nearly on a line, the residual has valleys in which it must
         # rise before it falls
-        yield lambda there: found[0][:, failed], "natural"
+        yield lambda there: best[0][:, failed], "natural"
         for how in ("direct", "natural"):
             for link in contact.rests:
                 yield partial(Moving.at_rest, link=link), how
@@ -182,15 +182,15 @@ def _search(
             yield lambda there: None, method
 
     for guess, how in guesses():
-        failed = np.flatnonzero(~(found[1] <= enough))
+        failed = np.flatnonzero(~(best[1] <= enough))
         if not failed.size:
             break
         there = moving.at(failed)
         new = _attempt(there, guess(there), tolerance, max_iterations, how)
-        better = new[1] < found[1][failed]
-        for old, some in zip(found, new, strict=True):
+        better = new[1] < best[1][failed]
+        for old, some in zip(best, new, strict=True):
             old[..., failed[better]] = some[..., better]
-    return found
+    return best
 
 
 class _Batch:
@@ -233,16 +233,16 @@ def _midpoint_velocity(now: Instant, link: np.ndarray) -> np.ndarray:
 
 def _attempt(
     moving: Moving, start: np.ndarray | None, tolerance: float, max_iterations: int, method: str
-) -> Found:
+) -> Attempt:
     """By the compiled kernel, or the same steps by NumPy."""
     if (library := native_kernel(moving.body, moving.friction)) is not None:
         n_time = moving.angles.shape[1]
         z, velocity, residual = np.empty((3, n_time)), np.empty((3, n_time)), np.empty(n_time)
         iterations, anchor = np.empty((2, n_time), dtype=np.int64)
         settings = moving.load, start, tolerance, max_iterations, METHODS.index(method)
-        found = z, residual, iterations, anchor, velocity
-        call_for_all(library.colloc_balance, moving, *settings, *found)
-        return found
+        outputs = z, residual, iterations, anchor, velocity
+        call_for_all(library.colloc_balance, moving, *settings, *outputs)
+        return outputs
     body, friction, angles, rates, delta, load = moving
     n_time = angles.shape[1]
     # work in units of the largest rate, where the law is homogeneous once delta scales along
@@ -313,8 +313,8 @@ def _following(
     values = np.empty((7, n_time))
     slopes = np.empty((6, columns, n_time) if differentiated else 0)
     if (library := native_kernel(body, friction)) is not None:
-        given = load, solved.anchor, solved.anchor_velocity, values
-        call_for_all(library.colloc_motion, moving, *given, slopes if differentiated else None)
+        arguments = load, solved.anchor, solved.anchor_velocity, values
+        call_for_all(library.colloc_motion, moving, *arguments, slopes if differentiated else None)
         return BalancedMotion(values[:3], values[3:5], values[5], values[6]), slopes
     y = np.concatenate([angles, rates] if load is None else [angles, rates, load])
     values[:3] = solved.z

@@ -111,9 +111,9 @@ class Foot:
     def kind(self) -> str:
         """Its kind: "pad" with an extent, "wheel" if its own friction is lower along than across,
         else "foot"."""
-        own = self.friction
-        rolls = isinstance(own, Friction) and own.mu_f == own.mu_b < own.mu_t
-        rolls = rolls or (isinstance(own, Axle) and own.rolling < own.sideways)
+        friction = self.friction
+        rolls = isinstance(friction, Friction) and friction.mu_f == friction.mu_b < friction.mu_t
+        rolls = rolls or (isinstance(friction, Axle) and friction.rolling < friction.sideways)
         return PAD if self.extent else WHEEL if rolls else FOOT
 
     @property
@@ -246,16 +246,16 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
             )
         places = (np.arange(feet) + 0.5) / max(feet, 1)
         feet = [Foot(link, float(place)) for link in range(weights.size) for place in places]
-    given = list(feet) if isinstance(feet, Iterable) else [feet]
-    stated = [foot for foot in given if isinstance(foot, Foot)]
-    if len(stated) < len(given):
+    parts = list(feet) if isinstance(feet, Iterable) else [feet]
+    each = [foot for foot in parts if isinstance(foot, Foot)]
+    if len(each) < len(parts):
         raise ProblemError(
             "body.feet must be the number of feet on each link, or a sequence of Foot, Wheel "
             "and Pad."
         )
-    if not stated:
+    if not each:
         return ()
-    for foot in stated:
+    for foot in each:
         if not 0 <= foot.link < weights.size:
             raise ProblemError(
                 f"a foot stands on link {foot.link}, but the links are numbered 0 to "
@@ -263,10 +263,9 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
             )
 
     def weight(foot):
-        """Its stated load, or its share of what the other feet leave of the link's weight."""
         if foot.weight is not None:
             return float(foot.weight)
-        others = [other.weight for other in stated if other.link == foot.link]
+        others = [other.weight for other in each if other.link == foot.link]
         left = float(weights[foot.link]) - sum(each for each in others if each is not None)
         if left <= 0:
             raise ProblemError(
@@ -275,7 +274,7 @@ def checked_feet(feet: int | Iterable[Foot], weights: np.ndarray) -> tuple[Foot,
             )
         return left / others.count(None)
 
-    feet = tuple(replace(foot, weight=weight(foot)) for foot in stated)
+    feet = tuple(replace(foot, weight=weight(foot)) for foot in each)
     total = sum(foot.weight or 0.0 for foot in feet)
     if abs(total - 1.0) > _TOLERANCE:
         carried = sorted(set(range(weights.size)) - {foot.link for foot in feet})
@@ -531,13 +530,13 @@ class FloorContact:
             return ()
         places = self.along, self.offset, self.cos, self.sin, self.length, self.pressure
         rows, links = list[tuple[float, ...]](), list[int]()
-        for link, weight, place, own in zip(
+        for link, weight, place, row in zip(
             self.links, self.weight[:, 0], np.hstack(places), numbers, strict=True
         ):
-            rows.append((*place, *own[:5]))
-            if own[5:]:  # of an axle along, as of a foot at its middle that is turned to the left
+            rows.append((*place, *row[:5]))
+            if row[5:]:  # of an axle along, as of a foot at its middle that is turned to the left
                 a, h, cos, sin, *_ = place
-                rows.append((a, h, -sin, cos, 0.0, weight, *own[5:]))
+                rows.append((a, h, -sin, cos, 0.0, weight, *row[5:]))
             links += [link] * (len(rows) - len(links))
         first = np.searchsorted(links, np.arange(len(self.scatter) + 1))
         head = len(self.scatter), len(rows), law.largest, float(law.associated), *first

@@ -145,11 +145,11 @@ def call_for_all(
     many pieces. `MemoryError` if it fails."""
     angles, rates = (np.ascontiguousarray(a, dtype=float) for a in (moving.angles, moving.rates))
     n_time, chain = angles.shape[1], chain_parameters(moving.body, moving.friction)
-    given = [np.ascontiguousarray(a) if isinstance(a, np.ndarray) else a for a in arguments]
+    converted = [np.ascontiguousarray(a) if isinstance(a, np.ndarray) else a for a in arguments]
 
     def call(first):
         last = min(first + piece, n_time)
-        return function(*chain, n_time, first, last, angles, rates, moving.delta, *given)
+        return function(*chain, n_time, first, last, angles, rates, moving.delta, *converted)
 
     starts = range(0, n_time, piece)
     if len(starts) > 1 and (workers := min(available_threads(), len(starts))) > 1:
@@ -172,7 +172,7 @@ def chain_parameters(body: Any, friction: Law) -> tuple[Any, ...]:
 def kernel_repeating(
     library: ctypes.CDLL,
     moving: Moving,
-    near: np.ndarray,
+    guess: np.ndarray,
     froude: float,
     scheme: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray, bool]:
@@ -180,11 +180,11 @@ def kernel_repeating(
     (`colloc.dynamics.states.CollocatedStates.scheme`), their outputs ``(9, n_time)``, and whether
     there are any; from an initial guess whose last column is the start."""
     n_time, spin = moving.angles.shape[1], moving.body.inertia_column()
-    states, start = near[:, :-1].copy(), near[:, -1].copy()
+    states, start = guess[:, :-1].copy(), guess[:, -1].copy()
     values, converged = np.empty((9, n_time)), np.zeros(1, dtype=np.intc)
     settings = spin, froude, *scheme[1].shape, *scheme
-    found = states, start, values, converged
-    call_for_all(library.colloc_repeating, moving, *settings, *found, piece=n_time)
+    outputs = states, start, values, converged
+    call_for_all(library.colloc_repeating, moving, *settings, *outputs, piece=n_time)
     return states, values, bool(converged[0])
 
 
@@ -193,6 +193,6 @@ def kernel_balances(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Balanced velocities ``(3, n_time)`` by Newton's method from `start`, several time points side
     by side, and where there are any ``(n_time,)``; digits are lost at links that rest."""
-    z, lost = np.empty(start.shape), np.empty(start.shape[1], dtype=np.int64)
-    call_for_all(library.colloc_balances, moving, start, tolerance, z, lost)
-    return z, lost == 0
+    z, failures = np.empty(start.shape), np.empty(start.shape[1], dtype=np.int64)
+    call_for_all(library.colloc_balances, moving, start, tolerance, z, failures)
+    return z, failures == 0

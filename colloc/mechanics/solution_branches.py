@@ -83,19 +83,19 @@ def all_balanced_velocities(
     if friction.associated:
         return Branches(*_solve(moving, np.zeros((1, 3, angles.shape[1])), "auto"))
     z, sign = _solve(moving, np.stack([moving.at_rest(link) for link in body.contact.rests]))
-    found = _distinct(z, sign, _largest_rate(rates))
-    doubtful = np.flatnonzero((found.number > 1) | ~found.complete)
+    roots = _distinct(z, sign, _largest_rate(rates))
+    doubtful = np.flatnonzero((roots.number > 1) | ~roots.complete)
     if doubtful.size:
         # where a branch has just ended the solver may hang with a small residual; the solution
         # then lies beside
         part, known = moving.at(doubtful), (z[:, :, doubtful], sign[:, doubtful])
         more = _solve(part, _between_and_beside(part, known[0]))
-        found = _replace(found, part, doubtful, *map(np.concatenate, zip(known, more, strict=True)))
-    missed = np.flatnonzero(found.number == 0)
-    if doubtful.size and missed.size:
-        part = moving.at(missed)  # the long way, which is hardly ever needed
-        found = _replace(found, part, missed, *_solve(part, np.zeros((1, 3, missed.size)), "auto"))
-    return found
+        roots = _replace(roots, part, doubtful, *map(np.concatenate, zip(known, more, strict=True)))
+    none = np.flatnonzero(roots.number == 0)
+    if doubtful.size and none.size:
+        part = moving.at(none)  # the long way, which is hardly ever needed
+        roots = _replace(roots, part, none, *_solve(part, np.zeros((1, 3, none.size)), "auto"))
+    return roots
 
 
 def _largest_rate(rates: np.ndarray) -> np.ndarray:
@@ -109,31 +109,31 @@ def _solve(
     repeated, and signs ``(n_start, n_time)``: 0 there, and where none is found."""
     count, n_time = starts.shape[0], starts.shape[2]
     z, largest = np.concatenate(list(starts), axis=1), _largest_rate(moving.rates)
-    unsolved, found = np.flatnonzero(~np.isnan(z[0])), np.zeros(z.shape[1], dtype=bool)
+    pending, valid = np.flatnonzero(~np.isnan(z[0])), np.zeros(z.shape[1], dtype=bool)
 
-    def repeated(found):
-        each = np.where(found, z, np.nan).reshape(3, count, n_time).transpose(1, 0, 2)
+    def repeated(valid):
+        each = np.where(valid, z, np.nan).reshape(3, count, n_time).transpose(1, 0, 2)
         return _repeat(each, largest).ravel()
 
     library = native_kernel(moving.body, moving.friction)
     if library is not None and method == "direct" and moving.load is None:
         # most starts lead to one velocity, which is solved for to all digits once
-        part = moving.at(unsolved % n_time)
-        velocities, found[unsolved] = kernel_balances(library, part, z[:, unsolved], _TOLERANCE)
-        z[:, found] = velocities[:, found[unsolved]]
-        unsolved = unsolved[~repeated(found)[unsolved]]
-    part, sign = moving.at(unsolved % n_time), np.zeros(z.shape[1])
+        part = moving.at(pending % n_time)
+        velocities, valid[pending] = kernel_balances(library, part, z[:, pending], _TOLERANCE)
+        z[:, valid] = velocities[:, valid[pending]]
+        pending = pending[~repeated(valid)[pending]]
+    part, sign = moving.at(pending % n_time), np.zeros(z.shape[1])
     solved = solve_balance(
-        *part[:5], load=part.load, start=z[:, unsolved], tolerance=_TOLERANCE, method=method
+        *part[:5], load=part.load, start=z[:, pending], tolerance=_TOLERANCE, method=method
     )
-    z[:, unsolved] = solved.z
-    found[unsolved] = (solved.residual <= _ACCEPTED) | solved.converged
-    again = repeated(found)
-    new = np.flatnonzero((found & ~again)[unsolved])
+    z[:, pending] = solved.z
+    valid[pending] = (solved.residual <= _ACCEPTED) | solved.converged
+    again = repeated(valid)
+    new = np.flatnonzero((valid & ~again)[pending])
     for link, chosen in groups(solved.anchor[new]):  # seen from what rests, which loses no digits
         at = new[chosen]
         jacobian = _jacobian(part.at(at), solved.anchor_velocity[:, at], link)
-        sign[unsolved[at]] = np.sign(np.linalg.det(jacobian))
+        sign[pending[at]] = np.sign(np.linalg.det(jacobian))
     z[:, again] = np.nan
     return z.reshape(3, count, n_time).transpose(1, 0, 2), sign.reshape(count, -1)
 
@@ -204,21 +204,21 @@ def followed_motion(
     Instants are those of one period in order of time, followed with or against it (`sense`), or
     such that tail velocities shortly before are known (`before`, ``(3, n_time)``).
     """
-    found = all_balanced_velocities(at.body, at.friction, at.angles, at.rates, at.delta)
-    if not found.number.all():
-        lost = int((found.number == 0).sum())
+    roots = all_balanced_velocities(at.body, at.friction, at.angles, at.rates, at.delta)
+    if not roots.number.all():
+        lost = int((roots.number == 0).sum())
         raise NotConvergedError(
-            f"no velocity that balances the body was found at {lost} of {found.number.size} "
+            f"no velocity that balances the body was found at {lost} of {roots.number.size} "
             f"time points."
         )
-    z, several = found.z[0].copy(), np.flatnonzero(found.number > 1)
+    z, several = roots.z[0].copy(), np.flatnonzero(roots.number > 1)
     apart = np.zeros((3 + len(quantities), z.shape[1]))
     if several.size:
-        some = Branches(found.z[:, :, several], found.sign[:, several])
+        some = Branches(roots.z[:, :, several], roots.sign[:, several])
         apart[:, several] = _ranges(at.take(several), some, quantities)
-    for now, previous in _order(found.number > 1, sense):
+    for now, previous in _order(roots.number > 1, sense):
         last = z[:, previous] if before is None else before[:, now]
-        z[:, now] = _nearest(found.z[:, :, now], found.sign[:, now], last)
+        z[:, now] = _nearest(roots.z[:, :, now], roots.sign[:, now], last)
     return z, apart
 
 
@@ -235,13 +235,13 @@ def on_one_branch(
         return z
     followed, at, moves = z.copy(), np.arange(z.shape[1]), np.zeros(z.shape[1], dtype=bool)
     for _ in range(2 * z.shape[1]):
-        found = body.solve(
+        solved = body.solve(
             friction, angles[:, at], rates[:, at], delta, start=followed[:, at - 1]
         ).z
-        moved = np.abs(found - followed[:, at]).max(axis=0) > _SAME * np.abs(z).max()
+        moved = np.abs(solved - followed[:, at]).max(axis=0) > _SAME * np.abs(z).max()
         if not moved.any():
             break
-        followed[:, at[moved]], moves[at[moved]] = found[:, moved], True
+        followed[:, at[moved]], moves[at[moved]] = solved[:, moved], True
         # what comes after these began at another velocity
         at = (at[moved] + 1) % z.shape[1]
     if not moves.any():
@@ -271,9 +271,9 @@ def _nearest(z: np.ndarray, sign: np.ndarray, before: np.ndarray) -> np.ndarray:
     return z[np.nanargmin(stable if np.isfinite(stable).any() else distance)]
 
 
-def _ranges(at: Instants, found: Branches, quantities: Sequence[Quantity]) -> np.ndarray:
+def _ranges(at: Instants, roots: Branches, quantities: Sequence[Quantity]) -> np.ndarray:
     rows = []
-    for z, sign in zip(found.z, found.sign, strict=True):
+    for z, sign in zip(roots.z, roots.sign, strict=True):
         now = at.body.sliding(at.friction, at.angles, at.rates, z, at.delta)
         row = np.concatenate(
             [now.centre, z[2:], now.power, *(each.at(replace(at, z=z)) for each in quantities)]

@@ -220,8 +220,6 @@ class SqpResult(NamedTuple):
 
 
 class _Point(NamedTuple):
-    """A point; what cannot be evaluated is far too large."""
-
     v: np.ndarray
     objective: float
     rows: np.ndarray

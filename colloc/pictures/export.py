@@ -31,6 +31,7 @@ from scipy.integrate import cumulative_trapezoid, trapezoid
 from scipy.interpolate import CubicHermiteSpline
 
 from colloc.gaits.gait_fields import fields
+from colloc.gaits.problem import Problem
 from colloc.gaits.robot import joint_ranges
 from colloc.laws.resistance import Elliptic
 from colloc.mechanics.chain import Chain
@@ -142,7 +143,76 @@ def write_export(
         If an argument is missing or unusable, the motion is prescribed, or the ramp crosses itself.
     """
     check_count(periods=periods)
-    problem, kinds = solution.problem, (".csv", ".json", ".yaml", ".h", *MODELS)
+    problem = solution.problem
+    _check_format(problem, path, degrees, servo)
+    if path.suffix in MODELS:
+        if max_speed is not None:
+            raise ProblemError("a model for simulators holds no motion: leave max_speed out.")
+        return _write_model(solution.robot(length, mass, period, gravity=gravity), path)
+    if problem.robot is not None:
+        sheet = stated_robot(solution, length=length, mass=mass, period=period, gravity=gravity)
+        length, mass, gravity = (sheet[name] for name in ("length", "mass", "gravity"))
+        period = period if max_speed is not None else sheet["period"]
+    gravity = GRAVITY if gravity is None else gravity
+    limits = None if max_speed is None else np.array(max_speed, dtype=float)
+    keep_pace = bool(problem.paced_by)
+    cycle = plan_trajectory(solution.gait.motor_gait, rate, period, limits, keep_pace=keep_pace)
+    if periods * cycle.time.size > MOST_SAMPLES:
+        raise ProblemError(
+            f"{periods} cycles have too many samples: a file holds at most {MOST_SAMPLES}."
+        )
+    facts = _facts(solution, cycle, rate, limits)
+    if keep_pace:
+        facts |= _facts_of_pace(solution, cycle, length, gravity)
+    parts: list[Approach | Trajectory] = [cycle]
+    if ramp:
+        parts = [way_in := _way_in(problem, cycle, rate, limits), cycle]
+    rows = [[part.angles, part.speeds] for part in parts]
+    at_pace = None  # the robot, if the timing is the gait's own
+    if length is not None or mass is not None:
+        if length is None or mass is None:
+            raise ProblemError("torques need both the length and the mass of the robot.")
+        # the period that was requested: that of whole samples may be another pace
+        robot = RobotSheet(solution, length, mass, period or cycle.period, gravity)
+        facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
+        if limits is None or keep_pace:
+            at_pace, torques = robot, robot.torques(cycle.phase)
+            facts["torques"] = "those of this pace; of slow motion before time 0"
+            facts["distance_at_this_pace_m"] = robot.facts["speed_m_per_s"] * robot.period
+        else:  # inertia with another timing is not known
+            torques = joint_torques(solution, cycle.phase, froude=solution.froude)
+            torques = robot.torque_unit * torques
+            facts["torques"] = "those of slow motion, as the pace is not the gait's own"
+        if ramp:
+            joints = problem.joint_path(way_in.angles, cycle.period * way_in.speeds)
+            pull = problem.regime.pull(np.full((1, way_in.time.size), solution.gait.theta or 0.0))
+            rows[0].append(robot.torque_unit * quasi_static_torques(solution, *joints, pull))
+        rows[-1].append(torques)
+        for row in rows:
+            row.append(row[2] * row[1])
+    time = (np.arange(periods)[:, None] * cycle.period + cycle.time).ravel()
+    table = np.tile(rows[-1], periods)  # (unit, joint, time)
+    if ramp:
+        facts["ramp_s"] = -float(way_in.time[0])
+        if not problem.regime.slides:
+            fine = _way_in(problem, cycle, _FINE / cycle.period, limits)
+            facts |= _end(solution, cycle, fine, periods, at_pace)
+        time = np.append(way_in.time, time)
+        table = np.append(np.array(rows[0]), table, axis=2)
+    if ramp and path.suffix == ".yaml":  # and out of it, as into the gait played backwards
+        back = [np.roll(x[:, ::-1], 1, axis=1) for x in (cycle.angles, cycle.speeds)]
+        way = _way_in(problem, replace(cycle, angles=back[0], speeds=-back[1]), rate, limits)
+        ends = zip((cycle.angles, cycle.speeds), (way.angles, -way.speeds), strict=True)
+        out = np.array([np.hstack([first[:, :1], rest[:, ::-1]]) for first, rest in ends])
+        table = np.append(table[:2], out, axis=2)
+        time = time[0] + np.arange(table.shape[2]) / rate
+        facts["ramp_out_s"] = -float(way.time[0])
+    _write_samples(path, facts, solution.gait.motor_gait.coordinate, time, table, degrees, servo)
+    return facts
+
+
+def _check_format(problem: Problem, path: Path, degrees: bool, servo: Servo | None) -> None:
+    kinds = (".csv", ".json", ".yaml", ".h", *MODELS)
     if path.suffix not in kinds:
         raise ProblemError(f"{path} should end in {' or '.join(kinds)}.")
     if not problem.gait.free:
@@ -153,27 +223,20 @@ def write_export(
         raise ProblemError("degrees are for angles in CSV and JSON: leave them out.")
     if servo and path.suffix not in (".csv", ".h"):
         raise ProblemError(f"pulses of servos are written as .csv or .h, not {path.suffix}.")
-    if path.suffix in MODELS:
-        if max_speed is not None:
-            raise ProblemError("a model for simulators holds no motion: leave max_speed out.")
-        return _write_model(solution.robot(length, mass, period, gravity=gravity), path)
-    if problem.robot is not None:
-        stated = stated_robot(solution, length=length, mass=mass, period=period, gravity=gravity)
-        length, mass, gravity = (stated[name] for name in ("length", "mass", "gravity"))
-        period = period if max_speed is not None else stated["period"]
-    gravity = GRAVITY if gravity is None else gravity
-    limits = None if max_speed is None else np.array(max_speed, dtype=float)
-    gait, paced_by, froude = solution.gait.motor_gait, problem.paced_by, solution.froude
-    trajectory = plan_trajectory(gait, rate, period, limits, keep_pace=bool(paced_by))
-    measured = solution.measured
-    facts: dict[str, Any] = {
+
+
+def _facts(
+    solution: Solution, cycle: Trajectory, rate: float, limits: np.ndarray | None
+) -> dict[str, Any]:
+    problem, measured = solution.problem, solution.measured
+    return {
         "name": problem.name,
         "status": solution.status,
-        "period_s": trajectory.period,
+        "period_s": cycle.period,
         "rate_hz": float(rate),
-        "samples_per_period": trajectory.time.size,
+        "samples_per_period": cycle.time.size,
         "max_speed_rad_per_s": None if limits is None else np.ravel(limits).tolist(),
-        "largest_speed_rad_per_s": np.abs(trajectory.speeds).max(axis=1).tolist(),
+        "largest_speed_rad_per_s": np.abs(cycle.speeds).max(axis=1).tolist(),
         "body": problem.body.describe(),
         "friction": fields(problem.law),
         "efficiency": measured.efficiency,
@@ -186,68 +249,47 @@ def write_export(
         "work_per_period_weight_times_length": measured.work,
         "problem_hash": problem.hash,
     }
-    if paced_by:
-        holds = "in a period of 1"
-        if froude:
-            unit, holds = froude * pressing(solution, gravity), f"at Froude number {froude:.4g}: "
-            needed = math.sqrt(length / unit) if length else trajectory.period
-            holds += f"a robot of {unit * needed**2:.3g} m in {needed:.4g} s"
-            if abs(trajectory.period - needed) > 1e-6 * needed:
-                holds += f"; this cycle takes {trajectory.period:.4g} s"
-        facts["pace"] = f"the gait's own, as {paced_by}; distance and work hold {holds}"
-        facts |= {"froude_number": froude} if froude else {}
 
-    def into_gait(rate, trajectory=trajectory):
-        speeds, most = np.abs(trajectory.speeds), limits
-        if limits is None:
-            stated = np.array(problem.largest_speeds) / trajectory.period
-            most = np.maximum(stated, speeds.max(axis=1)) if stated.size else speeds.max()
-        way = approach(trajectory, rate, one_each(most, problem.n_motor, "joint speed limit"))  # type: ignore[arg-type]
-        angles, _ = problem.joint_path(way.angles, way.speeds)
-        crossing = float(crossing_depth(problem.body, angles).max())
-        if max(crossing, passing_depth(problem.body, angles)) > _CROSSES:
-            raise ProblemError(
-                "the body crosses itself on the way from straight into the gait: leave it out "
-                "(ramp=False, --no-ramp), and bring the robot to the first sample by hand."
-            )
-        return way
 
-    parts: list[Approach | Trajectory] = [into_gait(rate), trajectory] if ramp else [trajectory]
-    rows = [[part.angles, part.speeds] for part in parts]
-    at_pace = None  # the robot, if the timing is the gait's own
-    if length is not None or mass is not None:
-        if length is None or mass is None:
-            raise ProblemError("torques need both the length and the mass of the robot.")
-        # the period that was requested: that of whole samples may be another pace
-        robot = RobotSheet(solution, length, mass, period or trajectory.period, gravity)
-        facts |= {"length_m": length, "mass_kg": mass, "gravity_m_per_s2": gravity}
-        if limits is None or paced_by:
-            at_pace, torques = robot, robot.torques(trajectory.phase)
-            facts["torques"] = "those of this pace; of slow motion before time 0"
-            facts["distance_at_this_pace_m"] = robot.facts["speed_m_per_s"] * robot.period
-        else:  # inertia with another timing is not known
-            torques = robot.torque_unit * joint_torques(solution, trajectory.phase, froude=froude)
-            facts["torques"] = "those of slow motion, as the pace is not the gait's own"
-        rows[-1].append(torques)
-        if ramp:
-            joints = problem.joint_path(parts[0].angles, trajectory.period * parts[0].speeds)
-            pull = problem.regime.pull(np.full((1, parts[0].time.size), solution.gait.theta or 0.0))
-            rows[0].append(robot.torque_unit * quasi_static_torques(solution, *joints, pull))
-        for row in rows:
-            row.append(row[2] * row[1])
-    if periods * trajectory.time.size > MOST_SAMPLES:
+def _facts_of_pace(
+    solution: Solution, cycle: Trajectory, length: float | None, gravity: float
+) -> dict[str, Any]:
+    froude = solution.froude
+    pace = f"the gait's own, as {solution.problem.paced_by}; distance and work hold "
+    if not froude:
+        return {"pace": pace + "in a period of 1"}
+    unit = froude * pressing(solution, gravity)
+    needed = math.sqrt(length / unit) if length else cycle.period
+    pace += f"at Froude number {froude:.4g}: a robot of {unit * needed**2:.3g} m in {needed:.4g} s"
+    if abs(cycle.period - needed) > 1e-6 * needed:
+        pace += f"; this cycle takes {cycle.period:.4g} s"
+    return {"pace": pace, "froude_number": froude}
+
+
+def _way_in(
+    problem: Problem, cycle: Trajectory, rate: float, limits: np.ndarray | None
+) -> Approach:
+    """From the straight body at rest into a cycle; `ProblemError` where links would cross."""
+    speeds = np.abs(cycle.speeds)
+    most: Any = limits
+    if limits is None:
+        robot = np.array(problem.largest_speeds) / cycle.period
+        most = np.maximum(robot, speeds.max(axis=1)) if robot.size else speeds.max()
+    way = approach(cycle, rate, one_each(most, problem.n_motor, "joint speed limit"))
+    angles, _ = problem.joint_path(way.angles, way.speeds)
+    crossing = float(crossing_depth(problem.body, angles).max())
+    if max(crossing, passing_depth(problem.body, angles)) > _CROSSES:
         raise ProblemError(
-            f"{periods} cycles have too many samples: a file holds at most {MOST_SAMPLES}."
+            "the body crosses itself on the way from straight into the gait: leave it out "
+            "(ramp=False, --no-ramp), and bring the robot to the first sample by hand."
         )
-    time = (np.arange(periods)[:, None] * trajectory.period + trajectory.time).ravel()
-    table = np.tile(rows[-1], periods)  # (unit, joint, time)
-    if ramp:
-        facts["ramp_s"] = -float(parts[0].time[0])
-        if not problem.regime.slides:
-            fine = into_gait(_FINE / trajectory.period)
-            facts |= _end(solution, trajectory, fine, periods, at_pace)
-        time = np.append(parts[0].time, time)
-        table = np.append(np.array(rows[0]), table, axis=2)
+    return way
+
+
+def _write_samples(
+    path: Path, facts: dict[str, Any], coordinate: str, time: np.ndarray, table: np.ndarray,
+    degrees: bool, servo: Servo | None,
+) -> None:  # fmt: skip
     columns = dict(zip(_UNITS, table, strict=False))
     if degrees:
         columns = {
@@ -256,31 +298,24 @@ def write_export(
         }
     if servo:
         pulses, clamped = servo.pulses(table[0])
-        columns, facts = {"pulse": pulses}, facts | servo.facts() | {"clamped_samples": clamped}
-    motors = [f"{gait.coordinate}_{j + 1}" for j in range(table.shape[1])]
+        columns = {"pulse": pulses}
+        facts |= servo.facts() | {"clamped_samples": clamped}
+    motors = [f"{coordinate}_{j + 1}" for j in range(table.shape[1])]
     if path.suffix == ".csv":
         names = [f"{joint}_{unit}" for unit in columns for joint in motors]
         lines = [*comment_lines(facts), ",".join(["time_s", *names])]
         samples = np.vstack([time, *columns.values()]).T
         lines += [",".join(f"{x:.9g}" for x in row) for row in samples]
-        write_text(path, "\n".join(lines) + "\n")
+        text = "\n".join(lines) + "\n"
     elif path.suffix == ".h":
-        write_text(path, c_table(facts, path, motors, time, next(iter(columns.values()))))
+        text = c_table(facts, path, motors, time, next(iter(columns.values())))
     elif path.suffix == ".yaml":
-        angles, speeds = table[:2]
-        if ramp:  # and out of it, as into the gait played backwards
-            back = [np.roll(x[:, ::-1], 1, axis=1) for x in (trajectory.angles, trajectory.speeds)]
-            way = into_gait(rate, replace(trajectory, angles=back[0], speeds=-back[1]))
-            angles = np.hstack([angles, trajectory.angles[:, :1], way.angles[:, ::-1]])
-            speeds = np.hstack([speeds, trajectory.speeds[:, :1], -way.speeds[:, ::-1]])
-            time = time[0] + np.arange(angles.shape[1]) / rate
-            facts["ramp_out_s"] = -float(way.time[0])
-        write_text(path, joint_trajectory(facts, motors, time, angles, speeds))
+        text = joint_trajectory(facts, motors, time, *table[:2])
     else:
         arrays = {f"{_UNITS[unit]}_{unit}": values.tolist() for unit, values in columns.items()}
-        content = {**facts, "coordinate": gait.coordinate, "time_s": time.tolist(), **arrays}
-        write_text(path, json.dumps(content) + "\n")
-    return facts
+        content = {**facts, "coordinate": coordinate, "time_s": time.tolist(), **arrays}
+        text = json.dumps(content) + "\n"
+    write_text(path, text)
 
 
 def _end(
@@ -549,9 +584,9 @@ class Servo:
                 )
             columns += [*values.transpose(1, 0, 2)]
         neutral, scale, sign, low, high = columns
-        wanted = neutral + sign * scale * np.degrees(angles)
-        kept = np.clip(wanted, low, high)
-        return np.rint(kept).astype(int), np.sum(kept != wanted, axis=1).tolist()
+        exact = neutral + sign * scale * np.degrees(angles)
+        clipped = np.clip(exact, low, high)
+        return np.rint(clipped).astype(int), np.sum(clipped != exact, axis=1).tolist()
 
     def facts(self) -> dict[str, Any]:
         return {

@@ -70,18 +70,17 @@ class Panel(NamedTuple):
 
 
 def _plot(
-    drawn: Mapping[str, Callable[[Axes], object]],
+    drawings: Mapping[str, Callable[[Axes], object]],
     ax: Any,
     panel: str,
     size: tuple[float, float] = (0, 0),
     stacked: bool = False,
 ) -> Any:
-    """One panel on axes, or else a figure of all of them beside or below each other."""
     if ax is None:
         with figure_style():
-            figure, rows = Picture(figsize=size), len(drawn) if stacked else 1
-            grid = figure.subplots(rows, len(drawn) // rows, sharex=stacked, squeeze=False)
-            for axes, draw in zip(grid.flat, drawn.values(), strict=True):
+            figure, rows = Picture(figsize=size), len(drawings) if stacked else 1
+            grid = figure.subplots(rows, len(drawings) // rows, sharex=stacked, squeeze=False)
+            for axes, draw in zip(grid.flat, drawings.values(), strict=True):
                 draw(axes)
                 if stacked:
                     axes.label_outer()
@@ -91,9 +90,9 @@ def _plot(
             f"ax must be a matplotlib Axes to draw on, not {ax!r}; "
             f'plot().savefig("mine.png"), or .pdf, or .svg, writes a file.'
         )
-    if panel not in drawn:
-        raise ProblemError(f"there is no panel {panel!r}; there are {', '.join(drawn)}.")
-    drawn[panel](ax)
+    if panel not in drawings:
+        raise ProblemError(f"there is no panel {panel!r}; there are {', '.join(drawings)}.")
+    drawings[panel](ax)
     return ax
 
 
@@ -126,8 +125,8 @@ def save_panels(solution: Solution, stem: Path) -> list[Path]:
 
 def plot_solution(solution: Solution, ax: Axes | None = None, panel: str = "gait") -> Any:
     if ax is not None:
-        named = {name: each.draw for name, each in panels(solution).items()}
-        return _plot({"gait": lambda axes: draw_gait(axes, solution), **named}, ax, panel)
+        by_name = {name: each.draw for name, each in panels(solution).items()}
+        return _plot({"gait": lambda axes: draw_gait(axes, solution), **by_name}, ax, panel)
     problem, solved = solution.problem, solution.success
     more = [text for text in (problem.scene, solution.turning) if text]
     if si := in_si(solution):

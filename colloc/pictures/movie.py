@@ -90,12 +90,10 @@ def frames(
 
 
 class _Scene:
-    """A gait on axes that show the middle of its frames and `half` a side on from there."""
-
     def __init__(
-        self, axes: Axes, body: Body, shown: Frames, half: np.ndarray, grid: float
+        self, axes: Axes, body: Body, frames: Frames, half: np.ndarray, grid: float
     ) -> None:
-        self._shown, middle = shown, 0.5 * sum(shown.window)
+        self._shown, middle = frames, 0.5 * sum(frames.window)
         for axis, a, b in zip("xy", middle - half, middle + half, strict=True):
             ticks = grid * np.arange(np.ceil(a / grid), np.floor(b / grid) + 1)
             axes.set(**{f"{axis}ticks": ticks, f"{axis}lim": (a, b)})
@@ -120,19 +118,18 @@ class _Scene:
         )  # fmt: skip
 
     def draw(self, number: int) -> np.ndarray:
-        """Its joint angles in the picture of this number."""
-        shown, motion = self._shown, self._shown.motion
+        frames, motion = self._shown, self._shown.motion
         period, k = divmod(number, motion.t.size - 1)
-        before = shown.before[period]
-        at = (shown.ends[:, :, k], motion.centre[:, k], shown.feet[..., k])
-        self._marks.place(map(before.of, at), shown.holding[:, k])
-        paths = shown.ends[:, 0], shown.ends[:, -1], motion.centre
+        before = frames.before[period]
+        at = (frames.ends[:, :, k], motion.centre[:, k], frames.feet[..., k])
+        self._marks.place(map(before.of, at), frames.holding[:, k])
+        paths = frames.ends[:, 0], frames.ends[:, -1], motion.centre
         for trail, path in zip(self._trails, paths, strict=True):
-            past = [earlier.of(path) for earlier in shown.before[:period]]
+            past = [earlier.of(path) for earlier in frames.before[:period]]
             trail.set_data(*np.concatenate([*past, before.of(path[:, : k + 1])], axis=1))
         if self._quiver is not None:
-            self._quiver.set_offsets(before.of(shown.arrow_base[:, :, k]).T)
-            forces = self._scale * rotate(shown.arrow[:, :, k], before.rotation)
+            self._quiver.set_offsets(before.of(frames.arrow_base[:, :, k]).T)
+            forces = self._scale * rotate(frames.arrow[:, :, k], before.rotation)
             self._quiver.set_UVC(*forces)
         return motion.angles[:, k]
 
@@ -155,28 +152,28 @@ def pictures(
     real = all(facts)
     sizes = [each.problem.robot.length if real else 1.0 for each in both]  # type: ignore[union-attr]
     times = [each["period_s"] if real else 1.0 for each in facts]
-    shown = []
+    shots = []
     for each, seconds in zip(both, times, strict=True):
         a_period = max(2, round(count * seconds / max(times)))
         number = -(-periods * count // a_period)
         if from_rest:
             motion = each.from_rest(np.linspace(0.0, number, number * a_period + 1))
-            shown.append(frames(each, periods=1, motion=motion))
+            shots.append(frames(each, periods=1, motion=motion))
         else:
-            shown.append(frames(each, a_period + 1, periods=number))
+            shots.append(frames(each, a_period + 1, periods=number))
     planar = alone and solution.problem.gait.free and solution.problem.body.n_joint >= 2
     share = 0.68 if planar else 0.97 if alone else 0.48
-    windows = (np.subtract(*each.window[::-1]) for each in shown)
+    windows = (np.subtract(*each.window[::-1]) for each in shots)
     span = np.max([size * wide for size, wide in zip(sizes, windows, strict=True)], axis=0)
     tall = float(np.clip(span[1] / span[0], 0.4, 0.9)) * share * width
     height = 2 * round((tall + 0.13 * width) / 2)
     scale = max(span[0] / (share * width), span[1] / tall)  # lengths of a pixel
-    strength, small = min(each.arrow_scale for each in shown), min(1.0, width / 640)
+    strength, small = min(each.arrow_scale for each in shots), min(1.0, width / 640)
     with figure_style():
         figure = Figure(figsize=(width / 100, height / 100), dpi=100)
         figure.set_layout_engine("none")
         canvas, scenes = FigureCanvasAgg(figure), []
-        for k, (each, size, one) in enumerate(zip(both, sizes, shown, strict=True)):
+        for k, (each, size, one) in enumerate(zip(both, sizes, shots, strict=True)):
             left, bottom = 0.015 + 0.495 * k, 0.03 if alone else 0.095 * width / height
             axes = figure.add_axes((left, bottom, share, tall / height))
             half = 0.5 * scale / size * np.array([share * width, tall])

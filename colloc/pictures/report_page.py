@@ -185,27 +185,27 @@ def _toy(body: Body, law: Any) -> dict[str, Any] | None:
     return {"lengths": body.lengths, "weights": body.weight_column()[:, 0].tolist()}  # type: ignore[attr-defined]
 
 
-def _motion_data(shown: Frames, body: Body) -> dict[str, Any]:
-    motion, (low, high) = shown.motion, shown.window
+def _motion_data(frames: Frames, body: Body) -> dict[str, Any]:
+    motion, (low, high) = frames.motion, frames.window
     steps = (0.1, 0.2, 0.5, 1, 2, 5, 10, 1e9)
     wide, tall = high - low
-    (x, y), (arrow_x, arrow_y), (force_x, force_y) = shown.ends, shown.arrow_base, shown.arrow
+    (x, y), (arrow_x, arrow_y), (force_x, force_y) = frames.ends, frames.arrow_base, frames.arrow
     rows: dict[str, Any] = {
         "t": motion.t, "angles": motion.angles, "x": x, "y": y, "centre": motion.centre,
         "arrowX": arrow_x, "arrowY": arrow_y, "window": [low[0], high[0], low[1], high[1]],
-        "feet": shown.feet,
+        "feet": frames.feet,
     }  # fmt: skip
-    before = [np.array([np.exp(1j * b.rotation), b.shift]).view(float) for b in shown.before]
+    before = [np.array([np.exp(1j * b.rotation), b.shift]).view(float) for b in frames.before]
     return {name: np.round(row, 4).tolist() for name, row in rows.items()} | {
         "forceX": np.round(force_x, 3).tolist(),
         "forceY": np.round(force_y, 3).tolist(),
-        "holding": shown.holding.astype(int).tolist(),
+        "holding": frames.holding.astype(int).tolist(),
         "footKinds": foot_kinds(body),
         "footWords": _foot_words(body),
         "hinges": hinges(body).indices(len(x))[:2],
         "width": link_width(body),
         "before": [each.round(6).tolist() for each in before],
-        "arrowScale": shown.arrow_scale,
+        "arrowScale": frames.arrow_scale,
         "grid": next(step for step in steps if max(wide, tall) / step < 16),
         "shape": float(np.clip(wide / tall, 1.2, 4.0)),
     }
@@ -256,36 +256,35 @@ def _comparison_section(solution: Solution, other: Solution) -> dict[str, Any]:
 
 
 def _films(solutions: Mapping[str, Solution]) -> list[tuple[str, Markup]]:
-    shown = {name: _film(each) for name, each in solutions.items()}
-    scale = min(min(_FILM / np.ptp(each.window, axis=0)) for each in shown.values())
-    cards = (_card(each, shown[x], scale, film_alone=True) for x, each in solutions.items())
+    films = {name: _film(each) for name, each in solutions.items()}
+    scale = min(min(_FILM / np.ptp(each.window, axis=0)) for each in films.values())
+    cards = (_card(each, films[x], scale, film_alone=True) for x, each in solutions.items())
     return list(zip(solutions, map(Markup, cards), strict=True))
 
 
 def solution_card(solution: Solution) -> str:
     """A card with two cycles from above, as points of an animated SVG, and the numbers."""
-    shown = _film(solution)
-    return _card(solution, shown, min(_FILM / np.ptp(shown.window, axis=0)))
+    film = _film(solution)
+    return _card(solution, film, min(_FILM / np.ptp(film.window, axis=0)))
 
 
 def _film(solution: Solution) -> Frames:
     return frames(solution, _FILM_FRAMES + 1, arrows=1, periods=_FILM_PERIODS)
 
 
-def _card(solution: Solution, shown: Frames, scale: float, *, film_alone: bool = False) -> str:
-    body, (low, high) = solution.problem.body, shown.window
-    points = np.linspace(0, len(shown.ends[0]) - 1, min(30, len(shown.ends[0]))).round().astype(int)
+def _card(solution: Solution, film: Frames, scale: float, *, film_alone: bool = False) -> str:
+    body, (low, high) = solution.problem.body, film.window
+    points = np.linspace(0, len(film.ends[0]) - 1, min(30, len(film.ends[0]))).round().astype(int)
 
     def texts(places):
-        """Points ``(2, n_point, n_time)`` of every frame of all periods; y points down."""
         once = places[..., :-1]
-        moved = [before.of(once.reshape(2, -1)).reshape(once.shape) for before in shown.before]
+        moved = [before.of(once.reshape(2, -1)).reshape(once.shape) for before in film.before]
         x, y = np.concatenate(moved, axis=-1)
         pixels = np.stack([scale * (x - low[0]), scale * (high[1] - y)])
         return [" ".join(f"{x:.1f},{y:.1f}" for x, y in at.T) for at in np.moveaxis(pixels, -1, 0)]
 
-    slides = np.tile(~shown.holding[:, :-1], _FILM_PERIODS).astype(int)
-    feet = zip(foot_kinds(body), np.moveaxis(shown.feet, 2, 0), slides, strict=True)
+    slides = np.tile(~film.holding[:, :-1], _FILM_PERIODS).astype(int)
+    feet = zip(foot_kinds(body), np.moveaxis(film.feet, 2, 0), slides, strict=True)
     return render(
         "card.html",
         solution=solution,
@@ -293,7 +292,7 @@ def _card(solution: Solution, shown: Frames, scale: float, *, film_alone: bool =
         foot_words=_foot_words(body),
         size=np.ceil(scale * (high - low)).astype(int),
         width=max(scale * link_width(body), 4.0),
-        spine=texts(shown.ends[:, points]),
-        track=" ".join(texts(shown.motion.centre[:, None])),
+        spine=texts(film.ends[:, points]),
+        track=" ".join(texts(film.motion.centre[:, None])),
         feet=[{"kind": kind, "frames": texts(at), "slides": row} for kind, at, row in feet],
     )

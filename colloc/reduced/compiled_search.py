@@ -69,7 +69,7 @@ def nearest(
     result = _minimize(program, target, None, fields)
     if result is not None:
         return result.v
-    stated: Any = SimpleNamespace(
+    projection: Any = SimpleNamespace(
         lower=program.lower,
         upper=program.upper,
         row_lower=lower,
@@ -79,7 +79,7 @@ def nearest(
         rows=lambda v: np.append(program.rows(v), v @ area @ v),
         row_slopes=lambda v: np.vstack([program.row_slopes(v), 2 * area @ v]),
     )
-    return sqp.minimize(stated, target, np.inf, accuracy, iterations).v
+    return sqp.minimize(projection, target, np.inf, accuracy, iterations).v
 
 
 def _minimize(
@@ -101,13 +101,13 @@ def _minimize(
     box = {"low": program.lower, "high": program.upper}
     counts = {"n": v.size, "n_formula": len(formulas), "delta": delta}
     of_program = {"formulas": np.concatenate(listed), **rows, **box, **counts}
-    stated = of_motion | kernel_rows | of_program | fields
+    numbers = of_motion | kernel_rows | of_program | fields
     arrays = {
         name: np.ascontiguousarray(value, np.int64 if name in _INDICES else float)
-        for name, value in stated.items()
+        for name, value in numbers.items()
         if isinstance(value, np.ndarray)
     }
-    search = _Search(**stated | {name: array.ctypes.data for name, array in arrays.items()})
+    search = _Search(**numbers | {name: array.ctypes.data for name, array in arrays.items()})
     end, z, out, totals = v.copy(), start.z.copy(), np.empty(start.out.shape), np.empty(4)
     b = np.eye(v.size) if curvature is None else curvature.copy()
     shapes = [np.ascontiguousarray(each) for each in start.shapes[:2]]

@@ -47,23 +47,24 @@ class LinearSpace(SearchSpace):
             self._square = self._gaits.mean_square_rate(n_joint) / (2 * np.pi) ** 2
         self._n_static = len(control.admissible.static)
         lower, upper = control.admissible.bounds()
-        self.own = np.arange(lower.size)
+        self.indices = np.arange(lower.size)
         if not self._gaits.linear:
-            self.own = np.delete(self.own, slice(self._gaits.n_wave, lower.size - self._n_static))
-        self.lower, self.upper = lower[self.own], upper[self.own]
+            series = slice(self._gaits.n_wave, lower.size - self._n_static)
+            self.indices = np.delete(self.indices, series)
+        self.lower, self.upper = lower[self.indices], upper[self.indices]
         self._at_worst = keep_last(self._constraints)
 
     def shape(self, v: np.ndarray) -> np.ndarray:
         """Parameters of the class, of serpenoid gaits with their Fourier coefficients."""
-        own = v[: self.n - self._n_static]
-        return own if self._gaits.linear else self._gaits.full(own, self._matrix.shape[1] // 2)
+        p = v[: self.n - self._n_static]
+        return p if self._gaits.linear else self._gaits.full(p, self._matrix.shape[1] // 2)
 
     def shape_vjp(self, v: np.ndarray, on_shape: np.ndarray) -> np.ndarray:
         """Derivatives ``(k, n)`` along v from those along `shape`."""
-        own = v[: self.n - self._n_static]
+        p = v[: self.n - self._n_static]
         if not self._gaits.linear:
-            slopes = self._gaits.coefficient_slopes(own, self._matrix.shape[1] // 2)
-            on_shape = on_shape @ np.vstack([np.eye(own.size), slopes])
+            slopes = self._gaits.coefficient_slopes(p, self._matrix.shape[1] // 2)
+            on_shape = on_shape @ np.vstack([np.eye(p.size), slopes])
         none = np.zeros((len(on_shape), self._n_static))
         return np.concatenate([on_shape, none], axis=1) if self._n_static else on_shape
 
@@ -142,23 +143,23 @@ class LinearSpace(SearchSpace):
 
         @keep_last
         def at_worst(v):
-            found = functions.copy()
+            there = functions.copy()
             worst = placed.follow(moving, gaits, self._table(v), mesh, self._limit)
-            found[:, moving] = checks.functions(gaits, which[moving], worst)
-            return found
+            there[:, moving] = checks.functions(gaits, which[moving], worst)
+            return there
 
         def rows(functions_at):
             def shapes(v):
                 return self._table(v) @ functions_at(v) + rest
 
             def values(v):
-                found = checks.values(which, shapes(v), placed.shares)
-                return np.append(found, self._square_of_speed(v)[0])
+                values = checks.values(which, shapes(v), placed.shares)
+                return np.append(values, self._square_of_speed(v)[0])
 
             def slopes(v):
                 on_shapes = checks.slopes(which, shapes(v), placed.shares)
-                found = gaits.pull_back(on_shapes, functions_at(v))
-                return self.shape_vjp(v, np.vstack([found, self._square_of_speed(v)[1]]))
+                slopes = gaits.pull_back(on_shapes, functions_at(v))
+                return self.shape_vjp(v, np.vstack([slopes, self._square_of_speed(v)[1]]))
 
             most = float(excess.max(initial=-np.inf))
             return Constraints(kinds, lower, np.append(upper, np.inf), most, values, slopes)
@@ -180,7 +181,6 @@ class LinearSpace(SearchSpace):
 
     @cached_property
     def _kernel_fields(self) -> dict[str, Any]:
-        """Of the compiled kernel's search (`colloc.reduced.compiled_search`)."""
         tables = np.array([self._table(unit).ravel() for unit in np.eye(self.n)]).T
         function, parameter = np.nonzero(tables)
         numbers, first = self.checks.kernel_numbers

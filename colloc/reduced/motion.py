@@ -40,8 +40,6 @@ from colloc.numerics.mesh import Mesh
 
 @dataclass(eq=False)
 class _State:
-    """The collocated motion of one v at one delta."""
-
     v: np.ndarray
     delta: float
     mesh: Mesh
@@ -63,7 +61,7 @@ class _State:
         return CollocatedPose.on_mesh(self.mesh, omega, np.array([cx, cy]), self.heading)
 
     @cached_property
-    def passed(self) -> PeriodTotals:
+    def cycle(self) -> PeriodTotals:
         if self.totals is not None:
             return self.totals
         assert self.along is not None
@@ -104,17 +102,17 @@ class ReducedMotion:
         of_v = v.copy(), delta, mesh, shapes, kind.initial_heading(static)
         begin, compiled = self._differentiated or last, self._compiled
         if compiled is not None and begin is not None and compiled.covers(shapes):
-            found = compiled.simulate(shapes, begin.z, begin.shapes)
-            if found is not None:
-                z, out, totals = found
+            solution = compiled.simulate(shapes, begin.z, begin.shapes)
+            if solution is not None:
+                z, out, totals = solution
                 self._last = _State(*of_v, z, out, None, totals)
                 return self._last
         along = kind.simulate(mesh, shapes, static, *self._start(shapes, static))
         now = along.now
         out = np.vstack([now.z[OMEGA] - self._even(pace), now.centre, now.power])
-        out[:, ~along.held] = np.nan
+        out[:, ~along.exist] = np.nan
         state = _State(*of_v, now.z, out, along)
-        if not kind.states or along.held.all():  # a search goes on from states that there are
+        if not kind.states or along.exist.all():  # a search goes on from states that there are
             self._last = state
         return state
 
@@ -138,8 +136,8 @@ class ReducedMotion:
         """Take a motion that the compiled kernel has found as the last one."""
         angles, rates, pace = self._space.at(v)
         shapes, (x, y, rotation, work) = Shapes(angles, rates, delta, pace=pace), totals.tolist()
-        passed = PeriodTotals(complex(x, y), rotation, work)
-        state = _State(v.copy(), delta, self.mesh, shapes, 0.0, z, out, None, passed)
+        cycle = PeriodTotals(complex(x, y), rotation, work)
+        state = _State(v.copy(), delta, self.mesh, shapes, 0.0, z, out, None, cycle)
         self._last = self._differentiated = state
 
     def _even(self, pace: np.ndarray | float) -> float:
@@ -149,7 +147,6 @@ class ReducedMotion:
     def _start(
         self, shapes: Shapes, static: np.ndarray
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """States and tail velocities to start from, along slopes where known."""
         kind, last, begin = self.kind, self._last, self._differentiated
         if kind.states and last is not None:
             is_near = begin is not None and begin.delta == shapes.delta
@@ -171,7 +168,7 @@ class ReducedMotion:
         """Totals of a period and integrals by name; NaN where there is no motion."""
         s = self.at(v, delta)
         if not s.values:
-            s.values = self.kind.totals(s.passed)
+            s.values = self.kind.totals(s.cycle)
             weight = self.kind.periods * s.shapes.pace * self._point_weight
             for each in self._integrals:
                 s.values[each.name] = float(self._at_points(each, s)[0] @ weight)
@@ -215,15 +212,14 @@ class ReducedMotion:
         return self._through(s, [TotalGradient()] * n_row, at_points, no_pace)
 
     def _of_torques(self, formula: Any) -> Any:
-        """Functions of a formula that speaks of forces that accelerate links, too, or None."""
         if formula.needs_forces and isinstance(self.kind, Inertial):
             return of_torques(self.kind.chain, self.kind.law, formula)
         return None
 
     def _at_points(self, formula: Any, s: _State, t: np.ndarray | None = None) -> np.ndarray:
         """Values of a formula ``(n_row, n_point)``; with torques also at times of the mesh."""
-        if found := self._of_torques(formula):
-            return found[0](self._torque_arguments(s, t), s.delta)
+        if functions := self._of_torques(formula):
+            return functions[0](self._torque_arguments(s, t), s.delta)
         return formula.at(self._instants(s))
 
     def _along_torque_arguments(
@@ -240,7 +236,7 @@ class ReducedMotion:
         by_states[:, : len(STATES)] = on_states
         totals = [TotalGradient()] * m
         if kind.regime.free:  # Fr = exp(-2 log_period)
-            froude = kind.froude_at(s.shapes, s.passed.static)
+            froude = kind.froude_at(s.shapes, s.cycle.static)
             on_log_period = -2.0 * froude * on_froude.sum(axis=(1, 2))
             totals = [TotalGradient(static=value) for value in on_log_period]
         on_points = np.concatenate([on_shape, np.zeros((m, 1, self.mesh.n_point))], axis=1)
@@ -259,7 +255,7 @@ class ReducedMotion:
             weights = mesh.scheme.lagrange(tau, begin=True)
             momenta = np.einsum("nj,anj->an", weights, np.concatenate(nodes, axis=2)[:, k])
         accelerations = self._space.accelerations(s.v, mesh.times if t is None else t)
-        froude = np.full((1, angles.shape[1]), kind.froude_at(s.shapes, s.passed.static))
+        froude = np.full((1, angles.shape[1]), kind.froude_at(s.shapes, s.cycle.static))
         return np.concatenate([angles, rates, accelerations, momenta, froude])
 
     def _instants(self, s: _State) -> Instants:
@@ -269,7 +265,7 @@ class ReducedMotion:
     def gradients(self, v: np.ndarray, delta: float) -> dict[str, np.ndarray]:
         """Derivatives of `values`, ``(n,)`` each."""
         s, kind = self.at(v, delta), self.kind
-        totals, weight, pace = kind.total_gradients(s.passed), self._point_weight, s.shapes.pace
+        totals, weight, pace = kind.total_gradients(s.cycle), self._point_weight, s.shapes.pace
         gradients = [*totals.values(), *[TotalGradient()] * len(self._integrals)]
         m, n_joint, n_point = len(gradients), len(s.shapes.rates), weight.size
         on_points, on_pace = np.zeros((m, 2 * n_joint + 1, n_point)), np.zeros((m, n_point))
@@ -318,13 +314,13 @@ class ReducedMotion:
             on_pace += np.outer(on_out[:, 0] @ pace, even / (weight @ pace) * weight)
         on_shape = np.einsum("krt,rjt->ktj", on_out * pace, slopes[OUTPUTS])
         on_shape += on_points[:, :-1].transpose(0, 2, 1)
-        found: np.ndarray = self._space.vjp(s.v, on_shape, on_pace)
+        on_v: np.ndarray = self._space.vjp(s.v, on_shape, on_pace)
         if self._n_static:
-            found[:, -self._n_static :] += on_begin
-            found[:, -self._n_static] += [each.static for each in gradients]
+            on_v[:, -self._n_static :] += on_begin
+            on_v[:, -self._n_static] += [each.static for each in gradients]
         if on_accelerations is not None and on_accelerations.any():
-            found += self._space.accelerations_vjp(s.v, on_accelerations)
-        return found
+            on_v += self._space.accelerations_vjp(s.v, on_accelerations)
+        return on_v
 
 
 def density_slopes(of: Quantity | PathLimits, now: Instants) -> np.ndarray:

@@ -56,12 +56,12 @@ class SearchSpace:
     """Gaits of a class on a mesh by parameters v, with their path constraints: here one gait, the
     only member of a class or that of parameters `full`.
 
-    own: indices of v ``(n,)`` among the full program's gait parameters. far: pairs of links more
+    indices: of v ``(n,)`` among the full program's gait parameters. far: pairs of links more
     than two apart that are kept apart.
     """
 
     lower = upper = _EMPTY
-    own = np.arange(0)
+    indices = np.arange(0)
     motion: ReducedMotion | None = None
     """Of the last search there."""
 
@@ -165,13 +165,13 @@ class ActuatorRows:
     def _largest(self, v: np.ndarray, delta: float) -> np.ndarray:
         mesh = self._motion.mesh
         t = mesh.edges[:-1, None] + mesh.h[:, None] * _INSIDE
-        found = self._sizes(v, delta, t)
-        largest: np.ndarray = found.max(axis=2)
+        sizes = self._sizes(v, delta, t)
+        largest: np.ndarray = sizes.max(axis=2)
         share, interval = np.nonzero(largest > 1.0 - _CLOSE)
         if share.size:
             each = np.arange(share.size)
-            near = np.clip(found[share, interval].argmax(axis=1), 1, SAMPLES - 1)
-            left, right = t[interval, near - 1], t[interval, near + 1]
+            worst = np.clip(sizes[share, interval].argmax(axis=1), 1, SAMPLES - 1)
+            left, right = t[interval, worst - 1], t[interval, worst + 1]
             at = left, right - left, _ZOOMS
             zoomed = peaks(lambda t: self._sizes(v, delta, t)[share, each], *at)[1]
             largest[share, interval] = np.maximum(largest[share, interval], zoomed)
@@ -180,17 +180,16 @@ class ActuatorRows:
     def of_moving_peaks(self, v: np.ndarray, delta: float, on_rows: np.ndarray) -> np.ndarray:
         """Part ``(n, n)`` of the Lagrangian's second derivatives that is due to peaks between the
         points which move with the gait (`colloc.reduced.second_order`)."""
-        held = np.flatnonzero(on_rows)
-        if held.size == 0:
+        active = np.flatnonzero(on_rows)
+        if active.size == 0:
             return np.zeros((v.size, v.size))
-        (share, point), on_rows = self.placed[:, held], on_rows[held]
+        (share, point), on_rows = self.placed[:, active], on_rows[active]
         mesh = self._motion.mesh
         interval = (mesh.points[:, :, None] == point).any(axis=1).argmax(axis=0)
-        each, left, width = np.arange(held.size), mesh.edges[interval], mesh.h[interval]
+        each, left, width = np.arange(active.size), mesh.edges[interval], mesh.h[interval]
         edge = _INSIDE[0] * width
 
         def shares(at, t):
-            """Of every row ``(n_row, k)``, for parameters and phases of that shape."""
             every = self._motion.shares(self._limits, at, delta, t.ravel())
             return every.reshape(-1, *t.shape)[share, each]
 
@@ -213,9 +212,9 @@ class ActuatorRows:
 
     def multipliers(self, on_rows: np.ndarray) -> np.ndarray:
         """Multipliers of the full program's rows, from those of these."""
-        found = np.zeros(self.upper.shape)
-        found[tuple(self.placed)] = on_rows
-        return found.T.ravel()
+        rows = np.zeros(self.upper.shape)
+        rows[tuple(self.placed)] = on_rows
+        return rows.T.ravel()
 
 
 class ReducedProgram:
@@ -231,12 +230,12 @@ class ReducedProgram:
         self.space, self.delta = space, delta
         control, aims = space.control, space.control.aims
         self.motion = ReducedMotion(control.dynamics, space.mesh, space, aims.integrals)
-        held = {"rotation": aims.rotation} if aims.closing == NONE else {}
-        held |= {"across": 0.0} if aims.no_way_across else {}
-        equal = {name: value for name, value in held.items() if value is not None}
-        self._held, least = [*equal], [value for _, value in aims.at_least]
-        self._own_lower = np.array([*equal.values(), *least])
-        self._own_upper = np.array([*equal.values(), *np.full(len(least), np.inf)])
+        totals = {"rotation": aims.rotation} if aims.closing == NONE else {}
+        totals |= {"across": 0.0} if aims.no_way_across else {}
+        equal = {name: value for name, value in totals.items() if value is not None}
+        self._equalities, least = [*equal], [value for _, value in aims.at_least]
+        self._total_lower = np.array([*equal.values(), *least])
+        self._total_upper = np.array([*equal.values(), *np.full(len(least), np.inf)])
         limits = control.actuators
         self.actuators = ActuatorRows(self.motion, limits) if limits.names else None
         self.lower, self.upper = space.lower, space.upper
@@ -246,7 +245,7 @@ class ReducedProgram:
     def formulas(self) -> list[Formula]:
         """The objective, and rows that depend on totals alone."""
         aims = self.space.control.aims
-        rows = [formula(name, (name,)) for name in self._held]
+        rows = [formula(name, (name,)) for name in self._equalities]
         return [aims.objective.formula, *rows, *(aim.formula for aim, _ in aims.at_least)]
 
     def place_rows(self, v: np.ndarray, reach: float = 0.0) -> float:
@@ -259,22 +258,22 @@ class ReducedProgram:
     def row_lower(self) -> np.ndarray:
         limits = self.actuators
         done = limits.lower[tuple(limits.placed)] if limits else _EMPTY
-        return np.concatenate([self._own_lower, done, self.constraints.lower])
+        return np.concatenate([self._total_lower, done, self.constraints.lower])
 
     @property
     def row_upper(self) -> np.ndarray:
         limits = self.actuators
         done = limits.upper[tuple(limits.placed)] if limits else _EMPTY
-        return np.concatenate([self._own_upper, done, self.constraints.upper])
+        return np.concatenate([self._total_upper, done, self.constraints.upper])
 
     @property
     def row_names(self) -> list[tuple[str, int]]:
         """Kind of each row, and index among the full program's rows of that kind."""
-        own = [("period", k) for k in range(self._own_lower.size)]
+        names = [("period", k) for k in range(self._total_lower.size)]
         placed = self.actuators.placed.T if self.actuators else ()
-        own += [(f"actuators, share {share}", int(point)) for share, point in placed]
+        names += [(f"actuators, share {share}", int(point)) for share, point in placed]
         kinds = self.constraints.kinds.items()
-        return own + [(kind, int(cell)) for kind, cells in kinds for cell in cells]
+        return names + [(kind, int(cell)) for kind, cells in kinds for cell in cells]
 
     def move_checks(self, v: np.ndarray, later: float = 0.0, reach: float = 0.0) -> float:
         """Move the path constraints to the worst instants of v, or later by a part of a mesh cell;
@@ -292,7 +291,7 @@ class ReducedProgram:
         actuators."""
         if self.actuators is None:
             return np.zeros((v.size, v.size))
-        first = self._own_lower.size
+        first = self._total_lower.size
         mine = on_rows[first : first + self.actuators.placed.shape[1]]
         return self.actuators.of_moving_peaks(v, self.delta, mine)
 
@@ -308,8 +307,8 @@ class ReducedProgram:
         control = self.space.control
         degrees = {each.name: each.friction_degree or 0.0 for each in control.aims.integrals}
         degrees["work"] = 1.0
-        found = self.motion.values(v, self.delta)
-        return {x: value * control.unit ** degrees.get(x, 0.0) for x, value in found.items()}
+        totals = self.motion.values(v, self.delta)
+        return {x: value * control.unit ** degrees.get(x, 0.0) for x, value in totals.items()}
 
     def gradient(self, v: np.ndarray) -> np.ndarray:
         return -self._slope(self.space.control.aims.objective, v)
@@ -318,14 +317,14 @@ class ReducedProgram:
         return aim.gradient(self.motion.values(v, self.delta), self._slopes(v)) + np.zeros_like(v)
 
     def rows(self, v: np.ndarray) -> np.ndarray:
-        values = self.motion.values(v, self.delta) if self._own_lower.size else {}
-        own = [values[name] for name in self._held]
-        own += [aim(values) for aim, _ in self.space.control.aims.at_least]
+        values = self.motion.values(v, self.delta) if self._total_lower.size else {}
+        rows = [values[name] for name in self._equalities]
+        rows += [aim(values) for aim, _ in self.space.control.aims.at_least]
         done = self.actuators.values(v, self.delta) if self.actuators else _EMPTY
-        return np.concatenate([own, done, self.constraints.values(v)])
+        return np.concatenate([rows, done, self.constraints.values(v)])
 
     def row_slopes(self, v: np.ndarray) -> np.ndarray:
-        own = [self._slopes(v)[name] for name in self._held]
-        own += [self._slope(aim, v) for aim, _ in self.space.control.aims.at_least]
+        slopes = [self._slopes(v)[name] for name in self._equalities]
+        slopes += [self._slope(aim, v) for aim, _ in self.space.control.aims.at_least]
         done = self.actuators.slopes(v, self.delta) if self.actuators else ()
-        return np.vstack([*own, *done, self.constraints.slopes(v)])
+        return np.vstack([*slopes, *done, self.constraints.slopes(v)])

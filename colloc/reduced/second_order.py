@@ -53,18 +53,18 @@ def curvature(program: ReducedProgram, v: np.ndarray) -> Curvature:
 
     def value(at):
         program.move_checks(at)
-        found, now = program.objective(at), program.rows(at)
+        lagrangian, now = program.objective(at), program.rows(at)
         place = {name: k for k, name in enumerate(program.row_names)}
         for name, k in bound:
             here = place.get(name)
             row = now[here] if here is not None else rows[k] + slopes[k] @ (at - v)
-            found += on_rows[k] * row
+            lagrangian += on_rows[k] * row
         program.move_checks(v)
-        return float(found)
+        return float(lagrangian)
 
-    held = (program.row_lower == program.row_upper) | (np.abs(on_rows) > _HELD)
+    active_rows = (program.row_lower == program.row_upper) | (np.abs(on_rows) > _HELD)
     fixed = np.eye(v.size)[np.abs(conditions.on_bounds) > _HELD]
-    active = np.vstack([slopes[held], fixed])
+    active = np.vstack([slopes[active_rows], fixed])
     active = active / np.maximum(np.linalg.norm(active, axis=1, keepdims=True), 1e-300)
     _, sizes, directions = np.linalg.svd(active)
     free = directions[int((sizes > _ONE_ROW * sizes.max(initial=0.0)).sum()) :].T
@@ -81,7 +81,6 @@ def curvature(program: ReducedProgram, v: np.ndarray) -> Curvature:
     moving += curvature_of_moving(on_rows, *map(np.array, zip(*around, strict=True)))
 
     def slope(at):
-        """Gradient of the Lagrangian with the rows at the worst instants of v."""
         return program.gradient(at) + on_rows @ program.row_slopes(at)
 
     def product(z, step):

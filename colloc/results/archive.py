@@ -134,8 +134,8 @@ def basins(problem: Problem, outcomes: Sequence[Outcome]) -> list[Basin]:
     groups: list[tuple[list[Outcome], Fourier]] = []
     for outcome in sorted((o for o in outcomes if o.status == SOLVED), key=lambda o: -o.value):
         path = fourier_series(problem, outcome.gait)
-        for members, near in groups:
-            if are_one(problem, (members[0].value, near), (outcome.value, path)):
+        for members, at in groups:
+            if are_one(problem, (members[0].value, at), (outcome.value, path)):
                 members.append(outcome)
                 break
         else:
@@ -193,13 +193,13 @@ def _read(path: Path, problem: Problem | None = None) -> Archive | None:
 
     if not (rows := read_rows(row_path(path), _ROWS, decode)):
         return None
-    stated = rows.pop("problem", None)
-    if stated is None:
+    subject = rows.pop("problem", None)
+    if subject is None:
         why = "is damaged: it does not say what problem it is about; move it away"
-    elif problem is not None and problem.hash != stated.hash:
+    elif problem is not None and problem.hash != subject.hash:
         why = "holds starts of another problem; choose another --output, or move it away"
     else:
-        return Archive(stated, path, dict(rows.values()))
+        return Archive(subject, path, dict(rows.values()))
     raise StoreError(f"{row_path(path)} {why}.")
 
 

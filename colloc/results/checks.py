@@ -176,9 +176,9 @@ def extrapolated_limit(values: Sequence[float], errors: Sequence[float]) -> tupl
     first, second = values[1] - values[0], values[2] - values[1]
     linear = _DECADE / (1 - _DECADE)
     falloff = min(abs(second) / max(abs(first), 1e-300), _SLOWEST)
-    left = max(max(linear, falloff / (1 - falloff)) * abs(second), linear * _DECADE * abs(first))
-    own = (1 + linear) * errors[2] + linear * errors[1]
-    return float(values[2] + linear * second), float(left + own)
+    rest = max(max(linear, falloff / (1 - falloff)) * abs(second), linear * _DECADE * abs(first))
+    error = (1 + linear) * errors[2] + linear * errors[1]
+    return float(values[2] + linear * second), float(rest + error)
 
 
 def measure(
@@ -201,7 +201,7 @@ def measure(
     for part in PARTS_OF_DELTA if smoothed else PARTS_OF_DELTA[:1]:
         how |= {"objective": objective, "turn": rotation or 0.0, "instants": instants}
         if replays:
-            how |= {"near": replays[-1], "instants": max(2 * (instants // (2 * _FEWER)), 4)}
+            how |= {"guess": replays[-1], "instants": max(2 * (instants // (2 * _FEWER)), 4)}
         replays.append(run(body, friction, path, part * delta, **how))
     fine, numbers = replays[0], dict[str, Any]()
     for name, of_limit, aim in (
@@ -217,10 +217,10 @@ def measure(
         limit = extrapolated_limit(values, errors) if smoothed else (values[0], errors[0])
         numbers[f"{name}_error"] = errors[0]
         numbers[f"{name}_at_zero_delta"], numbers[of_limit] = limit
-    stated = {name: fine.errors[name] + fine.others.get(name, 0.0) for name in ("distance", "work")}
-    stated["distance"] += astray(fine, rotation)
+    bounds = {name: fine.errors[name] + fine.others.get(name, 0.0) for name in ("distance", "work")}
+    bounds["distance"] += astray(fine, rotation)
     numbers |= {"value": fine.value, "instants": fine.instants}
-    return fine, Certificate(fine.values, stated, others={}, checks=(), **numbers)
+    return fine, Certificate(fine.values, bounds, others={}, checks=(), **numbers)
 
 
 def astray(replayed: Replay, rotation: float | None) -> float:

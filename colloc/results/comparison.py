@@ -45,7 +45,6 @@ def compare(a: Solution, b: Solution) -> tuple[Rows, Rows]:
 
 
 def _part(text: str, other: str) -> str:
-    """44 characters of a text, among them the first that differs from another."""
     at = next(k for k in count(0, 40) if text[k:][:40] != other[k:][:40])
     return "..." * (at > 0) + text[at:][:44]
 
@@ -58,8 +57,8 @@ def _fields(solution: Solution) -> dict[str, str]:
     texts, problem = dict[str, str](), solution.problem
     for name, value in problem.to_dict().items():
         parts = value if isinstance(value, dict) and name != "guess" else {"": value}
-        stated = ((f"{name} {part}".strip(), x) for part, x in parts.items() if x is not None)
-        texts |= {part: json.dumps(x) for part, x in stated}
+        named_parts = ((f"{name} {part}".strip(), x) for part, x in parts.items() if x is not None)
+        texts |= {part: json.dumps(x) for part, x in named_parts}
     texts["guess"] = f"moves by {_degrees(problem.guess)} deg"
     with suppress(ProblemError):
         if problem.with_(guess=None).hash == problem.hash:
@@ -182,9 +181,9 @@ def distance(a: Fourier, b: Fourier, body: Body, friction: Law) -> float:
 
 def are_one(problem: Problem, a: tuple[float, Fourier], b: tuple[float, Fourier]) -> bool:
     """True if two gaits, each by its value and its path, are the same."""
-    (one, path), (other, near) = a, b
+    (one, path), (other, other_path) = a, b
     close = abs(one - other) <= SAME_VALUE * max(abs(one), abs(other))
-    return close and distance(path, near, problem.body, problem.law) < SAME_GAIT
+    return close and distance(path, other_path, problem.body, problem.law) < SAME_GAIT
 
 
 def series_class(problem: Problem) -> Harmonic:

@@ -118,7 +118,6 @@ class _MotionWithInertia:
             self._heading = float(np.angle(end))
 
     def sample(self, t: np.ndarray) -> SampledMotion:
-        """Motion at ascending phases in [0, 1], in the axes of `Solution.sample`."""
         states = self._course.at(t)[:6]
         states[3:] = [states[3] - self._heading, *rotate(states[4:], -self._heading)]
         return motion_with_inertia(self._chain, self._gait, t, states)
@@ -129,18 +128,18 @@ def pressing(solution: Solution, gravity: float) -> float:
     return gravity * math.cos(math.atan(solution.problem.grade))
 
 
-def stated_robot(solution: Solution, **given: Any) -> dict[str, Any]:
+def stated_robot(solution: Solution, **changes: Any) -> dict[str, Any]:
     """Arguments of `RobotSheet` that are given, the others as the problem's robot has them; empty
     if there are none."""
-    stated, robot = {}, solution.problem.robot
+    arguments, robot = {}, solution.problem.robot
     if robot is not None:
         names = ("length", "mass", "gravity", "max_speed", "max_torque")
-        stated = {name: getattr(robot, name) for name in names} | {"period": period_of(solution)}
-    stated |= {name: value for name, value in given.items() if value is not None}
-    missing = [name for name in ("length", "mass", "period") if name not in stated]
-    if stated and missing:
+        arguments = {name: getattr(robot, name) for name in names} | {"period": period_of(solution)}
+    arguments |= {name: value for name, value in changes.items() if value is not None}
+    missing = [name for name in ("length", "mass", "period") if name not in arguments]
+    if arguments and missing:
         raise ProblemError(f"a robot needs its length, mass and period; {missing[0]} is missing.")
-    return stated
+    return arguments
 
 
 def period_of(solution: Solution) -> float:
@@ -295,8 +294,8 @@ class RobotSheet:
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the motion over a cycle as an xarray Dataset in SI units."""
-        stated = {name: value for name, value in self.facts.items() if value is not None}
-        return motion_dataset(self.columns, stated)
+        attributes = {name: value for name, value in self.facts.items() if value is not None}
+        return motion_dataset(self.columns, attributes)
 
     def plot(self, ax: Any = None, panel: str = "torque") -> Any:
         """Draw torque, speed and power of every joint over a cycle as a matplotlib Figure; with a
@@ -380,20 +379,16 @@ _FIELDS = {"joint speed": "speed_limit", "torque": "torque_limit", "power": "pow
 
 
 def _units(problem: Problem) -> dict[str, tuple[str, str, float]]:
-    """Names of limits as they were stated, their units, and those in the problem's."""
-    units = {
-        "speed_limit": ("speed_limit", "rad per period", 1.0),
-        "torque_limit": ("torque_limit", "weight x body length", 1.0),
-        "power_limit": ("power_limit", "weight x body length per period", 1.0),
-    }
-    for name, stated, unit in (
-        ("speed_limit", "max_speed", "rad/s"),
-        ("torque_limit", "max_torque", "N m"),
+    units = {}
+    for name, unit, of_robot, in_si in (
+        ("speed_limit", "rad per period", "max_speed", "rad/s"),
+        ("torque_limit", "weight x body length", "max_torque", "N m"),
+        ("power_limit", "weight x body length per period", "", ""),
     ):
-        limit = getattr(problem, name)
-        if problem.robot is not None and limit:  # not of a speed where the period is sought
-            size = np.ravel(getattr(problem.robot, stated))[0] / np.ravel(limit)[0]
-            units[name] = stated, unit, float(size)
+        units[name], limit = (name, unit, 1.0), getattr(problem, name)
+        if problem.robot is not None and limit and in_si:  # no speed where the period is sought
+            size = np.ravel(getattr(problem.robot, of_robot))[0] / np.ravel(limit)[0]
+            units[name] = of_robot, in_si, float(size)
     return units
 
 
@@ -460,12 +455,12 @@ def _hints(problem: Problem, speed_used: float) -> Iterator[str]:
         limit = getattr(problem, name)
         if not isinstance(limit, tuple):  # of all joints: it matters if it does to one of them
             bound = bound.max(keepdims=True)
-        stated = of_each(limit, bound.size)
-        if stated and (np.array(stated) > _MARGIN * bound).any():
-            joint = int(np.argmax(stated / bound))
+        limits = of_each(limit, bound.size)
+        if limits and (np.array(limits) > _MARGIN * bound).any():
+            joint = int(np.argmax(limits / bound))
             of = f" of joint {joint + 1}" * isinstance(limit, tuple)
             yield (
-                f"{called} {size * stated[joint]:g}{of} cannot matter: no gait needs more than "
+                f"{called} {size * limits[joint]:g}{of} cannot matter: no gait needs more than "
                 f"{size * bound[joint]:.3g} {unit}, its unit"
             )
     if speed_used > _BINDS:

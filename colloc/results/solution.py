@@ -185,9 +185,9 @@ class Solution:
     def quasi_static(self) -> Any:
         """Replay without inertia, with the chord of its arc, whatever phase it begins at;
         `NotConvergedError` if a slope does not hold it."""
-        play, asked = replayer(self.problem.regime.slowly), self.problem.objective.integrals
+        play, integrals = replayer(self.problem.regime.slowly), self.problem.objective.integrals
         turn = self.played_by(play, turn=self.problem.rotation or 0.0).rotation
-        return self.played_by(play, turn=turn, quantities=asked)
+        return self.played_by(play, turn=turn, quantities=integrals)
 
     @property
     def played_slowly(self) -> float:
@@ -291,8 +291,8 @@ class Solution:
             )
         how: Any = {"grade": p.grade, "theta": self.gait.theta or 0.0}
         how["periods"] = max(1, math.ceil(t[-1]))
-        ran = self.played_by(motion_from_rest, self.froude, **how)
-        states = np.array([np.interp(t, ran.phases, row) for row in ran.states])
+        motion = self.played_by(motion_from_rest, self.froude, **how)
+        states = np.array([np.interp(t, motion.phases, row) for row in motion.states])
         return motion_with_inertia(checked_mass(p.body), self.gait, t, states)
 
     def holding(self, motion: SampledMotion) -> np.ndarray:
@@ -382,12 +382,12 @@ class Solution:
 
         Options as there: `gravity`, `max_speed`, `max_torque`.
         """
-        given = higher("results.robot:stated_robot")(
+        robot = higher("results.robot:stated_robot")(
             self, length=length, mass=mass, period=period, **options
         )
-        if not given:
+        if not robot:
             raise ProblemError("state the robot's length [m], mass [kg] and period [s].")
-        return higher("results.robot:RobotSheet")(self, **given)
+        return higher("results.robot:RobotSheet")(self, **robot)
 
     @checked_arguments
     def sensitivity(self, resolve: bool = False) -> Any:

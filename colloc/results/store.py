@@ -129,11 +129,11 @@ def holds_more(path: str | os.PathLike[str], solution: Solution) -> bool:
     """True if the file of a solution holds more than `save` writes, such as remarks."""
 
     def names(file):
-        found = {f"/@{name}" for name in file.attrs}
+        each = {f"/@{name}" for name in file.attrs}
         file.visititems(
-            lambda at, item: found.update([at, *(f"{at}@{name}" for name in item.attrs)])
+            lambda at, item: each.update([at, *(f"{at}@{name}" for name in item.attrs)])
         )
-        return found
+        return each
 
     with h5py.File(path, "r", locking=False) as file, h5py.File(io.BytesIO(), "w") as written:
         _write(written, solution)
@@ -310,7 +310,6 @@ def _question(solution: Solution) -> dict:
 
 
 def _worth(there: Solution | None, new: Solution, path: Path) -> str:
-    """Description of a result that must not be replaced; "" if there is none."""
     if there is None:
         return "what was there and cannot be read" if path.exists() else ""
     if _question(there) != _question(new):

@@ -131,9 +131,9 @@ class Solver:
         period within a trust region of such a radius; `multipliers` (lam_x, lam_g) are those
         closest to stationarity by default."""
         t = self.program
-        own, lower, upper = t.layout.decisions, t.lower.copy(), t.upper.copy()
-        lower[own] = np.maximum(lower[own], x[own] - radius)
-        upper[own] = np.minimum(upper[own], x[own] + radius)
+        decisions, lower, upper = t.layout.decisions, t.lower.copy(), t.upper.copy()
+        lower[decisions] = np.maximum(lower[decisions], x[decisions] - radius)
+        upper[decisions] = np.minimum(upper[decisions], x[decisions] + radius)
         lam_x, lam_g = multipliers or self._complete(
             x, delta, np.zeros_like(x), np.zeros_like(t.row_lower)
         )
@@ -389,14 +389,14 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
     result = solver.solve_within(
         x, delta, (before.lam_x, before.lam_g), radius := OPTIONS.confirm_radius
     )
-    own = program.layout.decisions[space.own]
+    decisions = program.layout.decisions[space.indices]
     # beyond its checks by what SQP allows; at last, where the worst instant swings, by what a
     # certificate lets pass
     rounds = max_rounds(COARSE)
     for allowed in (*rounds * (TOLERANCES.violation,), TOLERANCES.kkt):
         if not result.optimal:
             break
-        if reduced.place_rows(result.x[own]) <= allowed:
+        if reduced.place_rows(result.x[decisions]) <= allowed:
             return program, result, ""
         program, x = program.moved_to(result.x)
         again = Solver(program, confirming).solve_within(x, delta, None, radius)
@@ -418,7 +418,6 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
 
 
 def _with_whole_turns(program: FullProgram, x: np.ndarray) -> FullProgram:
-    """The program with the net rotation of an antipodal gait closed as variables x close it."""
     if program.control.aims.closing != ANTIPODAL or "rotation" not in program.groups:
         return program
     theta = x[program.layout.theta[0]]
@@ -429,7 +428,6 @@ def _with_whole_turns(program: FullProgram, x: np.ndarray) -> FullProgram:
 def _multipliers(
     reduced: ReducedProgram, v: np.ndarray, program: FullProgram
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Multipliers of the full program's bounds and inequalities, from those of the reduced one."""
     lam_x, lam_g = np.zeros(program.n), np.zeros(program.row_lower.size)
     conditions, space = stationarity(reduced, v), reduced.space
     n_least = len(space.control.aims.at_least)
@@ -448,7 +446,7 @@ def _multipliers(
         )
         lam_g[program.groups[name].start + of_full] = on_shape[at + of_reduced]
         at += cells.size
-    lam_x[program.layout.decisions[space.own]] = conditions.on_bounds
+    lam_x[program.layout.decisions[space.indices]] = conditions.on_bounds
     return lam_x, lam_g
 
 
@@ -538,10 +536,10 @@ def solve_directly(problem: Problem) -> Answer:
         run.report("refine", done, OPTIONS.meshes)
         gait, control = answer.gait, space.control
         mesh, speed = control.in_phases(space.mesh, gait), answer.delta_per_period
-        plan = plan_mesh(control, mesh, gait, speed, problem.mesh_tolerance, kept=knots)
+        plan = plan_mesh(control, mesh, gait, speed, problem.mesh_tolerance, knots=knots)
         if plan is None:
             break
-        knots = np.concatenate([knots, plan.kept])
+        knots = np.concatenate([knots, plan.knots])
         space, v = space_near(problem, gait, plan.edges, plan.scheme)
         parameters = space.full_parameters(v)
         answer = answer_at(delta)

@@ -60,7 +60,6 @@ from colloc.verification.mesh_error import plan_mesh
 def _fit_gait(
     problem: Problem, gait: Given, period: float | None, harmonics: int | None, degrees: bool
 ) -> FittedGait:
-    """A gait of the motors; markers may tell the angles of joints, if these are the motors."""
     body = problem.body if isinstance(problem.body, Chain) and not problem.joint_map else None
     return fitted_gait(
         gait, problem.n_motor, period=period, harmonics=harmonics, degrees=degrees, body=body
@@ -134,40 +133,40 @@ def evaluate(
             "a gait is evaluated at one pace, by an objective without the period: state "
             "froude=0.05 (a robot: one period, or a record's times in s), and such an objective."
         )
-    stated, driven = with_motors(problem, series)
+    problem, driven = with_motors(problem, series)
     if driven.shape_speed < (least := problem.smallest_shape_speed):
         raise ProblemError(
             f"the gait hardly moves: its shape speed {driven.shape_speed:.3g} is below "
             f"smallest_shape_speed {least:g}, where friction is viscous."
         )
-    answer = on_fine_mesh(stated, driven)
+    answer = on_fine_mesh(problem, driven)
     turned = answer.rotation
     if abs(turned) < TOLERANCES.replay_gap * answer.distance:
         if not problem.uses("rotation"):  # which then may be anything
-            stated = stated.with_(rotation=0.0)
-            answer = replace(answer, problem=stated)
+            problem = problem.with_(rotation=0.0)
+            answer = replace(answer, problem=problem)
     else:  # how far it goes is then the chord of its arc
-        stated = stated.with_(rotation=turned)
-        answer = on_fine_mesh(stated, driven)
-    certificate, said = UNCERTIFIED, ""
+        problem = problem.with_(rotation=turned)
+        answer = on_fine_mesh(problem, driven)
+    certificate, remark = UNCERTIFIED, ""
     if goes_nowhere(answer):
         what = "there is nothing to certify: does it retrace its path?"
-        said = f" It has no net displacement, so {what}"
+        remark = f" It has no net displacement, so {what}"
     else:
         try:
             certificate = certify(answer)
-            said = f" It fails: {certificate.missed}." if certificate.missed else ""
+            remark = f" It fails: {certificate.missed}." if certificate.missed else ""
         except NotConvergedError as error:
-            said = f" The replay failed: {error}"
+            remark = f" The replay failed: {error}"
     if fitted.uncertainty is not None and certificate.replayed:
         errors, missed = _errors_of_samples(answer, series, fitted.uncertainty)
         if errors[0] > certificate.value_error:
             name = problem.objective.short
             what = f"{name} uncertain by {errors[0]:.1e} (two standard deviations{missed})"
-            said = f" This residual leaves {what}.{said}"
+            remark = f" This residual leaves {what}.{remark}"
         certificate = certificate.with_samples(errors)
-    message = f"{fitted.describe()}{at_pace}.{said}"
-    solution = Solution(stated, answer, certificate, message=message, settings=settings())
+    message = f"{fitted.describe()}{at_pace}.{remark}"
+    solution = Solution(problem, answer, certificate, message=message, settings=settings())
     if fitted.path is not None and fitted.went and certificate.replayed:
         solution.message += (
             f" The points went {fitted.went:.3g} body lengths per cycle, "
@@ -179,7 +178,6 @@ def evaluate(
 
 
 def _at_pace_of(problem: Problem, fitted: FittedGait) -> tuple[Problem, str]:
-    """A robot's problem at the pace of a record in seconds, and words for it."""
     robot, seconds = problem.robot, fitted.seconds
     if not robot or not seconds or np.isclose(robot.period, seconds, rtol=1e-3).all():
         return problem, ""
@@ -261,7 +259,7 @@ def _errors_of_samples(
         return scale * [*both, period["distance"], period["work"]]
 
     v = gait.resize(highest).table.ravel()
-    known, period, slopes = values(v), motion.values(v, delta), motion.gradients(v, delta)
+    totals, period, slopes = values(v), motion.values(v, delta), motion.gradients(v, delta)
     by_aim = [
         aim.gradient(period, slopes) + np.zeros_like(v) for aim in (aims.objective, EFFICIENCY)
     ]
@@ -271,11 +269,11 @@ def _errors_of_samples(
     changes = changes.reshape(len(changes), -1)
     noise = np.linalg.norm(gradients @ changes.T, axis=1)
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (4, len(changes)))
-    bent = [0.5 * (values(v + change) + values(v - change)) - known for change in signs @ changes]
+    bent = [0.5 * (values(v + change) + values(v - change)) - totals for change in signs @ changes]
     noise = samples.factor * (noise + np.abs(bent).max(axis=0))
     lack, missed = np.zeros(4), ""
     if richer is not None:
-        lack = np.abs(values(richer.resize(highest).table.ravel()) - known)
+        lack = np.abs(values(richer.resize(highest).table.ravel()) - totals)
         more = f"{richer.n_harmonic} harmonics would change it by {lack[0]:.1e}"
         missed = f", and lack of fit: {more}"
     return tuple(np.nan_to_num(noise + 1.25 * lack, nan=np.inf).tolist()), missed
@@ -352,7 +350,7 @@ class Identified:
         return {"coefficients": finite, **plain, "line": self.line}
 
     def __str__(self) -> str:
-        text: str = higher("pictures:render")("identified.txt", found=self, isfinite=math.isfinite)
+        text: str = higher("pictures:render")("identified.txt", result=self, isfinite=math.isfinite)
         return text.rstrip("\n")
 
 
@@ -435,7 +433,7 @@ def identify(
             raise ProblemError(
                 "with inertia the motion determines all coefficients: leave mu_forward out."
             )
-        fit.stated *= mu_forward / fit.stated[fit.forward]
+        fit.nominal *= mu_forward / fit.nominal[fit.forward]
     x, best, noise = np.zeros(len(fit.free)), math.inf, fit.noise
     before = fit.rms(fit.off(x))
     for begin in (0.0, 0.7, -0.7):  # of logarithms: squares may have several minima
@@ -473,7 +471,7 @@ def identify(
             "No coefficients reproduce the path: are lengths, order and signs of joints, and y "
             "right?"
         )
-    points = [name for name, k in _POINTS.items() if fit.seen[0, k].any() and name != "center"]
+    points = [name for name, k in _POINTS.items() if fit.mask[0, k].any() and name != "center"]
     unit = f"lengths of {length:g} m" if length else "lengths"
     path_of = ", ".join(points) or "headings"
     message = f"{fitted.describe(used)}{at_pace}; path of {path_of} in body {unit}"
@@ -531,7 +529,7 @@ class _Fit:
         if not groups:
             raise ProblemError(f"{problem.name} has a law without coefficients: state Friction().")
         values, self.groups = zip(*groups.values(), strict=True)
-        self.stated, short = np.array(values), [name.split(" of ")[0] for name in groups]
+        self.nominal, short = np.array(values), [name.split(" of ")[0] for name in groups]
         self.names = short if len({*short}) == len(short) else [*groups]
         along = {"mu_f", "tangential", "rolling"}
         self.forward = next((k for k, x in enumerate(short) if x in along), 0)
@@ -540,10 +538,10 @@ class _Fit:
         self.free = [k for k in every if k != self.forward or not self.only_ratios]
         self.prior = np.eye(len(self.free)) / _VAGUE
         self.noise = np.full((2, 1), 1e-3)  # of places and of headings
-        self.seen = np.isfinite(measured)
-        self.measured = np.where(self.seen, measured, 0)
+        self.mask = np.isfinite(measured)
+        self.measured = np.where(self.mask, measured, 0)
         # less the numbers that place the axes
-        counts, axes = self.seen.sum(axis=(1, 2)), self.seen.any(axis=2).sum(axis=1)
+        counts, axes = self.mask.sum(axis=(1, 2)), self.mask.any(axis=2).sum(axis=1)
         self.counts = counts * [2, 1] - [3 * (axes[0] > 0), axes[1]]
         self.freedom = max(float(self.counts.sum()) - len(self.free), 1.0)
         self.extent = self.rms(self.off_from(np.array([0 * phases, 0 * phases + 1])[:, None]))
@@ -551,7 +549,7 @@ class _Fit:
         self.mesh = on_fine_mesh(*for_path).mesh
 
     def values(self, x: np.ndarray) -> np.ndarray:
-        values = self.stated.copy()
+        values = self.nominal.copy()
         values[self.free] *= np.exp(x)
         return values
 
@@ -576,19 +574,18 @@ class _Fit:
     def off_from(self, predicted: np.ndarray) -> np.ndarray:
         """Predicted places less measured ones, and the angles between directions, in the axes that
         fit best, ``(2, 3, n_time)``."""
-        places, turns = np.where(self.seen, predicted, 0)
+        places, turns = np.where(self.mask, predicted, 0)
         at, measured = (
-            each - self.seen[0] * each.sum() / max(self.seen[0].sum(), 1)
+            each - self.mask[0] * each.sum() / max(self.mask[0].sum(), 1)
             for each in (places, self.measured[0])
         )
         turn, between = np.vdot(at, measured), turns * self.measured[1].conj()
         angles = np.angle(between * between.sum(axis=1, keepdims=True).conj())
-        return np.where(self.seen, [at * turn / max(abs(turn), 1e-300) - measured, angles], 0)
+        return np.where(self.mask, [at * turn / max(abs(turn), 1e-300) - measured, angles], 0)
 
     def rms(self, off: np.ndarray) -> float:
-        """Root mean square of places, or of headings if there are none."""
-        which = int(not self.seen[0].any())
-        return math.sqrt((np.abs(off[which]) ** 2).sum() / self.seen[which].sum())
+        which = int(not self.mask[0].any())
+        return math.sqrt((np.abs(off[which]) ** 2).sum() / self.mask[which].sum())
 
     def rows(self, x: np.ndarray, motors: Fourier | None = None) -> np.ndarray:
         """What squares are least of: residuals over their noise, and x over its own."""
@@ -600,7 +597,6 @@ class _Fit:
         return np.transpose([(self.rows(x + h) - self.rows(x - h)) / (2 * _STEP) for h in steps])
 
     def best(self, x: np.ndarray) -> np.ndarray:
-        """The best x, and the noise there."""
         if x.size:
             how: Any = {"bounds": (-_FARTHEST, _FARTHEST), "xtol": 1e-6}
             x = scipy.optimize.least_squares(self.rows, x, self.slopes, **how).x
@@ -629,7 +625,6 @@ class _Fit:
         return alike, covariance
 
     def describe(self, direction: np.ndarray) -> str:
-        """Sentence about a change of x that the motion does not show."""
         change = np.zeros(len(self.names))
         change[self.free] = direction / np.abs(direction).max()
         # any factor of all is left out, so as to name few

@@ -97,10 +97,10 @@ def first_optimum(problem: Problem, gait: AnyGait) -> Iterate:
         is_flat = here.kkt_error * COARSE <= OPTIONS.close * abs(here.objective)
         if is_flat and here.violation < COARSE:
             with suppress(NotConvergedError):
-                near = here if here.optimal else optimise(space, v, problem.delta, MEDIUM)
-                is_near = near.optimal and np.abs(near.v - v).max() < COARSE
-                if is_near and not regularisation_dominated(near):
-                    return near
+                optimum = here if here.optimal else optimise(space, v, problem.delta, MEDIUM)
+                is_same = optimum.optimal and np.abs(optimum.v - v).max() < COARSE
+                if is_same and not regularisation_dominated(optimum):
+                    return optimum
     v = space.parameters(project_to_zero_rotation(problem, gait, problem.delta_start))
     active_run().report("explore", 0, 1)
     for delta in delta_levels(problem, problem.delta_start):
@@ -111,7 +111,7 @@ def first_optimum(problem: Problem, gait: AnyGait) -> Iterate:
 
 
 def explore(
-    problem: Problem, starts: int | None = None, known: Sequence[AnyGait] = ()
+    problem: Problem, starts: int | None = None, guesses: Sequence[AnyGait] = ()
 ) -> Exploration:
     """The best gaits of a problem's class that so many starts, and at most three times as many,
     lead to, and gaits that are known: by default 32, with inertia 96 where no optima of slow motion
@@ -123,20 +123,20 @@ def explore(
     """
     run = active_run()
     try:
-        any_size = _follow_promising(problem, *multistart(problem, starts, known))
+        any_size = _follow_promising(problem, *multistart(problem, starts, guesses))
         if problem.shrinking or is_visible(any_size.optima[0].gait) or not run.has_time():
             return any_size
         finite = next((each for each in any_size.optima if is_visible(each.gait)), None)
         try:
             if finite:
                 size = finite.gait.shape_speed
-                stated = problem.with_(smallest_shape_speed=size, guess=finite.gait)
+                visible = problem.with_(smallest_shape_speed=size, guess=finite.gait)
             else:
-                stated = problem.with_(guess=None)
-                size = min(OPTIONS.min_size, stated.guess.shape_speed)
+                visible = problem.with_(guess=None)
+                size = min(OPTIONS.min_size, visible.guess.shape_speed)
                 size = max(size, problem.smallest_shape_speed)
-                stated = stated.with_(smallest_shape_speed=size)
-            large = _follow_promising(stated, *multistart(stated, starts, known))
+                visible = visible.with_(smallest_shape_speed=size)
+            large = _follow_promising(visible, *multistart(visible, starts, guesses))
         except CollocError:
             return any_size  # nothing moves as much
     finally:
@@ -169,8 +169,8 @@ def with_reachable_distance(problem: Problem) -> tuple[Problem, list[AnyGait]]:
     """The problem with its `least_distance` among `at_least`: all of it, or half of what the
     farthest gait goes, if that is less; and the gaits that go farthest, as few others may go as
     far. They are known first, unless the guess goes twice as far."""
-    stated = {aim.name for aim, _ in problem.at_least}
-    if problem.least_distance is None or "distance" in stated or not problem.gait.free:
+    aims = {aim.name for aim, _ in problem.at_least}
+    if problem.least_distance is None or "distance" in aims or not problem.gait.free:
         return problem, []
     optima, least = list[Iterate](), problem.least_distance
     if not _guess_goes(problem, 2 * least):
@@ -198,8 +198,8 @@ def follow_rest(problem: Problem, explored: Exploration) -> list[Iterate]:
         run.report("follow", done, len(left))
         with suppress(CollocError):
             end = follow(problem, candidate)
-            known = (*explored.optima, *ends)
-            is_new = not any(same_gait(problem, end, other) for other in known)
+            optima = (*explored.optima, *ends)
+            is_new = not any(same_gait(problem, end, other) for other in optima)
             if end.violation <= COARSE and is_new:
                 ends.append(end)
     return sorted(ends, key=lambda end: end.objective)
@@ -211,15 +211,15 @@ def starting_gaits(problem: Problem) -> Iterator[AnyGait]:
     body, limit = problem.body, problem.joint_limit
     # the two best ellipses of three equal links under isotropic friction: without them one harmonic
     # of other bodies is missed at times, as that of `problems/purcell.py`
-    known = [
+    gaits = [
         to_body(ellipse(*ab), Chain(), body, limit)
         for ab in ((0.0, 2.86, 1.30), (1.11, 0.67, 1.12))
     ]
-    known += [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
-    known = [to_class(problem, problem.gait.start_class, gait) for gait in known]
+    gaits += [travelling_wave(body, limit, w) for w in (-1.0, 1.0)]
+    gaits = [to_class(problem, problem.gait.start_class, gait) for gait in gaits]
     seeds = map(partial(latin_hypercube_gait, problem, 0), itertools.count())
     return itertools.chain(
-        itertools.chain.from_iterable(zip([problem.guess, *known], seeds, strict=False)), seeds
+        itertools.chain.from_iterable(zip([problem.guess, *gaits], seeds, strict=False)), seeds
     )
 
 
@@ -234,9 +234,9 @@ def in_slow_motion(problem: Problem) -> Problem | None:
 
     weak = {"torque_limit": None, "power_limit": None, "limits": ()}
     aims = [(without_motors(aim), least) for aim, least in problem.at_least]
-    objective, stated = without_motors(problem.objective), problem.without_robot
+    objective, slow = without_motors(problem.objective), problem.without_robot
     with suppress(ProblemError):
-        return stated.with_(froude=0.0, objective=objective, at_least=aims, **weak)
+        return slow.with_(froude=0.0, objective=objective, at_least=aims, **weak)
     return None
 
 
@@ -257,7 +257,7 @@ def same_gait(problem: Problem, a: Iterate, b: Iterate) -> bool:
 
 
 def multistart(
-    problem: Problem, starts: int | None, known: Sequence[AnyGait] = ()
+    problem: Problem, starts: int | None, guesses: Sequence[AnyGait] = ()
 ) -> tuple[list[Candidate], int]:
     """Candidates on a coarse mesh, best first, and the number of starts, at least one."""
     slow = slow_optima(problem)
@@ -282,7 +282,7 @@ def multistart(
     for loop in small_loops(problem):
         with suppress(CollocError):
             sketch(coarse, loop, True, [dry], [loops])
-    new_gaits, drawn, n_new = starting_gaits(problem), list[AnyGait | None](), 0
+    new_gaits, gaits, n_new = starting_gaits(problem), list[AnyGait | None](), 0
     tried, improved, best, begin = 0, -OPTIONS.patience, 0.0, time.process_time()
 
     def measure(candidates):
@@ -292,7 +292,7 @@ def multistart(
             objective = dry_program.objective(candidate.iterate.v)
             candidate.dry_objective = float(np.nan_to_num(objective, nan=np.inf))
 
-    first = [*known, *slow]
+    first = [*guesses, *slow]
     for done, gait in enumerate(first):
         run.report("explore", done, len(first) + count, _best([c.iterate for c in last]))
         with suppress(CollocError):
@@ -309,11 +309,11 @@ def multistart(
             best_gait = min(last, key=_DRY).iterate.gait
             size, rng = OPTIONS.hop * 2.0 ** (start % 3 - 1), np.random.default_rng([1, start])
             return problem.gait.start_class.perturb(best_gait, size, 1, rng), False
-        while len(drawn) <= number:
-            drawn.append(None)
+        while len(gaits) <= number:
+            gaits.append(None)
             with suppress(CollocError):
-                drawn[-1] = next(new_gaits)
-        return drawn[number], True
+                gaits[-1] = next(new_gaits)
+        return gaits[number], True
 
     def is_finished():
         n_met = min(last, key=_DRY).n_new if last else 0
@@ -382,17 +382,17 @@ def sketch(
         deltas, levels = deltas[-1:], levels[-1:]
     space, v = space_near(coarse, gait)
     before: Candidate | None = None
-    for delta, known in zip(deltas, levels, strict=True):
+    for delta, level in zip(deltas, levels, strict=True):
         iterate = optimise(space, v, delta, COARSE)
         if regularisation_dominated(iterate):
             continue  # as far as this delta goes, the start is as it was
         space, v = iterate.space, iterate.v
         if not iterate.violation <= COARSE:
             continue  # no member of the class
-        met = next((c for c in known if same_gait(coarse, c.iterate, iterate)), None)
+        met = next((c for c in level if same_gait(coarse, c.iterate, iterate)), None)
         candidate = met or Candidate(iterate)
         if met is None:
-            known.append(candidate)
+            level.append(candidate)
         if before is not None:
             before.next = candidate
         each: Candidate | None = candidate
@@ -431,7 +431,6 @@ def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int
         run.report("follow", len(candidates) - len(left), len(candidates), best)
 
     def add(candidate):
-        """Follow a candidate; return whether that led to a new gait, which the body follows."""
         is_new = False
         left.remove(candidate)
         run.ahead.wait_for(follow, problem, candidate.iterate)
@@ -552,9 +551,9 @@ def _shapes(problem: Problem) -> np.ndarray:
     body, limit, seeds = problem.body, problem.joint_limit, problem.gait.start_class
     n_joint = body.n_joint
     levels, rng = np.linspace(-1.0, 1.0, 5), np.random.default_rng(2)
-    drawn = rng.choice(levels, (_SHAPES, n_joint)) * widest(limit)
+    shapes = rng.choice(levels, (_SHAPES, n_joint)) * widest(limit)
     none, rest = np.zeros((n_joint, 1)), seeds.offset(n_joint)[:, 0]
-    constant = (Fourier(mean, none, none) for mean in drawn)
+    constant = (Fourier(mean, none, none) for mean in shapes)
     means = np.array([seeds.member(seeds.parameters(each), n_joint).mean for each in constant])
     # of a shape and its mirror image, the one whose first bend is to the left
     first = np.take_along_axis(means, (means != 0).argmax(axis=1)[:, None], axis=1)

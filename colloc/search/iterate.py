@@ -40,10 +40,6 @@ class Iterate:
     message: str = ""  # what refinement could not reach
     history: tuple[Step, ...] = ()  # iterates that led here, this one last
 
-    def __repr__(self) -> str:
-        size = f"{self.step.intervals} intervals{'' if self.optimal else ', not stationary'}"
-        return f"<Iterate {self.value:.6g} at delta = {self.delta:.1e}, {size}>"
-
     @property
     def problem(self) -> Problem:
         return self.space.control.problem

@@ -176,8 +176,8 @@ def regularisation_dominated(iterate: Iterate) -> bool:
     space = iterate.space
     drier = ReducedProgram(space, OPTIONS.delta_ratio * iterate.delta)
     drier.motion = space.motion or drier.motion  # which knows velocities to begin from
-    kept = (1 - OPTIONS.lost) * abs(iterate.objective)
-    return not drier.objective(iterate.v) <= iterate.objective + kept
+    share = (1 - OPTIONS.lost) * abs(iterate.objective)
+    return not drier.objective(iterate.v) <= iterate.objective + share
 
 
 def leave_saddle(iterate: Iterate) -> Iterate | None:
@@ -259,7 +259,7 @@ def refine(iterate: Iterate) -> Iterate:
                     gait,
                     delta_per_period(problem.gait, gait, iterate.delta),
                     problem.mesh_tolerance,
-                    kept=knots,
+                    knots=knots,
                     nested=count >= n_first,
                     aim=AIM * 0.5 ** min(max(0, count - n_first), n_first),
                     # the gait will move, and a finer plan be wasted
@@ -273,7 +273,7 @@ def refine(iterate: Iterate) -> Iterate:
             if more_panels is not None:
                 (space, v), kkt = more_panels, MEDIUM
             if plan is not None:
-                count, knots = count + 1, np.concatenate([knots, plan.kept])
+                count, knots = count + 1, np.concatenate([knots, plan.knots])
                 space, v = space_near(problem, gait, plan.edges, plan.scheme, space.far)
                 kkt = FINE if at_optimum or count > n_first else MEDIUM
             hessian = hessian if iterate.v.size == v.size else None
@@ -290,7 +290,7 @@ def on_more_panels(iterate: Iterate) -> tuple[SearchSpace, np.ndarray] | None:
     """The space with a smooth body on as many panels as the gait needs, and its parameters; None if
     half as many panels change the objective by less than six times the mesh tolerance."""
     old, here, problem = iterate.space, iterate.objective, iterate.problem
-    panels, found = panels_of(problem.body), None
+    panels, finer = panels_of(problem.body), None
     if panels == 0:
         return None
 
@@ -304,5 +304,5 @@ def on_more_panels(iterate: Iterate) -> tuple[SearchSpace, np.ndarray] | None:
     allowed = OPTIONS.panel_error * problem.mesh_tolerance
     while abs(here - before) > allowed * abs(here) and 2 * panels <= most:
         panels, before = 2 * panels, here
-        found, here = on(panels)
-    return found
+        finer, here = on(panels)
+    return finer

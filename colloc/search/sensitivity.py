@@ -47,14 +47,14 @@ class Again:
     value: float  # of the re-optimised gait, certified; NaN if it is not
     error: float
     status: str
-    kept: float  # of the gait on file, replayed there
-    kept_error: float
+    on_file: float  # of the gait on file, replayed there
+    on_file_error: float
     breaks: str  # limits that it does not keep there
 
     @property
     def behind(self) -> float:
         """Loss of the gait on file against the best one there; negative where it breaks a limit."""
-        return self.value - self.kept
+        return self.value - self.on_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
             f"only an optimum has a sensitivity, and this solve ended as: {solution.status}."
         )
     answer, certificate, effects = solution.answer, solution.certificate, []
-    finest, *others = _on_meshes(answer)
+    finest, *others = _lagrangians(answer)
     for parameter in parameters(answer.problem):
         sides = tuple(_neighbours(parameter, 4 * _STEP))  # as far as the differences go
         if not sides:  # such as the place of a pad as long as its link
@@ -142,13 +142,11 @@ def sensitivity(solution: Solution, resolve: bool = False, change: float = CHANG
             again = tuple(_again(solution, problem, side * change) for side, problem in beside)
         at = parameter.name, parameter.value, parameter.relative
         effects.append(Effect(*at, slope, error, sides, again))
-    problem, stated = solution.problem, (certificate.value, certificate.value_error)
-    return Sensitivity(problem.name, problem.objective.short, *stated, tuple(effects))
+    problem, value, error = solution.problem, certificate.value, certificate.value_error
+    return Sensitivity(problem.name, problem.objective.short, value, error, tuple(effects))
 
 
-def _on_meshes(answer: Answer) -> list[Callable[[Problem], float]]:
-    """Lagrangians at the optima of several meshes, as functions of the problem, the finest
-    first."""
+def _lagrangians(answer: Answer) -> list[Callable[[Problem], float]]:
     problem, gait, delta, edges = answer.problem, answer.gait, answer.delta, answer.edges
     far = far_pairs(problem.body)
 
@@ -174,8 +172,8 @@ def _lagrangian(space: SearchSpace, v: np.ndarray, delta: float) -> Callable[[Pr
     if not conditions.kkt_error <= 1e-4 * abs(optimum.objective(v)):
         why = f"the gradient of the Lagrangian does not vanish ({conditions.kkt_error:.0e})"
         raise ProblemError(f"the gait has no sensitivity: {why}, as at a kink.")
-    named = zip(optimum.row_names, conditions.on_rows, strict=True)
-    on_rows = {name: float(multiplier) for name, multiplier in named if multiplier}
+    rows = zip(optimum.row_names, conditions.on_rows, strict=True)
+    on_rows = {name: float(multiplier) for name, multiplier in rows if multiplier}
 
     def beyond(x, low, high, on):
         """Multipliers, positive at upper bounds, times (value - bound)."""
@@ -225,14 +223,14 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
     space, v = space_near(problem, gait)
     end = finish(problem, optimise(space, v, delta, MEDIUM))
     best = end.certificate if end.success else UNCERTIFIED
-    kept = replayer(problem.regime)(
+    on_file = replayer(problem.regime)(
         *(problem.body, problem.law, gait, delta_per_period(problem.gait, gait, delta)),
         breaks=gait.corner_phases,
         objective=problem.objective,
         quantities=problem.integrals,
         turn=turn,
     )
-    breaks, turned = [], kept.rotation - turn
+    breaks, turned = [], on_file.rotation - turn
     excess = ReducedProgram(space, delta).place_rows(v)
     if excess > 1e-5:  # [rad], or relative
         breaks.append(f"{excess:.2g} beyond its limits")
@@ -240,7 +238,7 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
     if problem.rotation is not None and closing == NONE and abs(turned) > 1e-4:
         breaks.append(f"turns {np.degrees(turned):+.2g}° too far per cycle")
     for aim, least in problem.at_least:
-        if aim(kept.values) < least * (1 - 1e-5):
-            breaks.append(f"{aim.name} {aim(kept.values):.4g}, not {least:.4g}")
-    here = kept.value, kept.error * abs(kept.value)
+        if aim(on_file.values) < least * (1 - 1e-5):
+            breaks.append(f"{aim.name} {aim(on_file.values):.4g}, not {least:.4g}")
+    here = on_file.value, on_file.error * abs(on_file.value)
     return Again(change, best.value, best.value_error, end.status, *here, "; ".join(breaks))

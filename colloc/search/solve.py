@@ -71,18 +71,18 @@ def solve(
     begin, run = time.monotonic(), Run(keep, problem, progress)
     try:
         with run.active(seconds):
-            reachable, known = with_reachable_distance(problem)
+            reachable, guesses = with_reachable_distance(problem)
             if search == FULL and problem.gait.free:
                 solution = certify_answer(reachable, solve_directly(reachable))
             else:
-                solution = _solve(reachable, starts, check, known)
-            asked = problem.least_distance
+                solution = _solve(reachable, starts, check, guesses)
+            least_distance = problem.least_distance
             least = {aim.name: least for aim, least in reachable.at_least}.get("distance")
-            if asked is not None and least is not None and least < asked:
+            if least_distance is not None and least is not None and least < least_distance:
                 solution.message = (
                     f"The farthest gait known at first goes {2 * least:.3g} body lengths per "
-                    f"cycle, less than the {asked:g} required, so half of that was required: "
-                    f"{least:.3g}. "
+                    f"cycle, less than the {least_distance:g} required, so half of that was "
+                    f"required: {least:.3g}. "
                     f"{solution.message}"
                 ).strip()
     except KeyboardInterrupt:
@@ -101,12 +101,12 @@ def _solve(
     problem: Problem,
     starts: int | None,
     check: Callable[[Iterate], object],
-    known: Sequence[AnyGait],
+    guesses: Sequence[AnyGait],
 ) -> Solution:
     explored, failure = None, ""
     if starts != 1 and problem.gait.free:
         try:
-            explored = explore(problem, starts, known)
+            explored = explore(problem, starts, guesses)
         except NotConvergedError as error:
             failure = str(error)  # what fails with the guess alone is said in detail
     explored = explored or Exploration([first_optimum(problem, problem.guess)], 1)
@@ -158,8 +158,8 @@ def finish(problem: Problem, optimum: Iterate) -> Solution:
         # a prescribed motion is measured at the delta that is asked for
         if "delta influence" not in failures or not problem.gait.free:
             break
-        old, stated = optimum.space, optimum.problem
-        drier = stated.with_(delta=OPTIONS.delta_ratio * stated.delta)
+        old, last = optimum.space, optimum.problem
+        drier = last.with_(delta=OPTIONS.delta_ratio * last.delta)
         optimum = replace(optimum, space=space_of(drier, old.edges, old.scheme, old.far))
         with suppress(NotConvergedError):  # there the body may have no such motion
             solution = certify_answer(problem, confirm_optimum(optimum))

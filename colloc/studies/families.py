@@ -181,7 +181,7 @@ def pareto_front(
     if not 2 <= points <= _MOST_POINTS:
         raise ProblemError(f"a front has 2 to {_MOST_POINTS} points, not {points}.")
     reachable, _ = with_reachable_distance(problem)
-    stated, intervals, certified = reachable.with_(least_distance=None), points - 1, list[_Point]()
+    free, intervals, certified = reachable.with_(least_distance=None), points - 1, list[_Point]()
 
     def add(solution):
         values, errors = _measure(solution, aims)
@@ -189,29 +189,29 @@ def pareto_front(
         if progress is not None:
             progress(len(certified), solution)
 
-    def optimum(which, level, near):
-        at_least = *stated.at_least, (aims[which], level)
-        asked = stated.with_(objective=aims[1 - which], at_least=at_least, delta_start=stated.delta)
-        space, v = space_near(asked, near.gait, near.edges)
-        end = optimise(space, v, asked.delta, MEDIUM)
+    def optimum(which, level, point):
+        at_least = *free.at_least, (aims[which], level)
+        beside = free.with_(objective=aims[1 - which], at_least=at_least, delta_start=free.delta)
+        space, v = space_near(beside, point.gait, point.edges)
+        end = optimise(space, v, beside.delta, MEDIUM)
         if end.violation > MEDIUM:
             raise NotConvergedError("no gait was found there")
         period = end.program().period(end.v)
         values = np.array([aim(period) for aim in aims])
-        return _Point(values, _ROUGH * np.abs(values), end.gait, near.edges, asked)
+        return _Point(values, _ROUGH * np.abs(values), end.gait, point.edges, beside)
 
     # the best by the second objective first: of two gaits that nobody can tell apart it stays
     for k, end in ((1, best), (0, None)):
-        end = end or solve_member(stated.with_(objective=aims[k]), starts)
+        end = end or solve_member(free.with_(objective=aims[k]), starts)
         if not end.success:
             raise ProblemError(
                 f"the gait of best {aims[k].name} is not verified, so there is no front: "
                 f"{end.message}"
             )
         add(end)
-    known, empty = [*certified], set[tuple[_Point, _Point]]()
+    front, empty = [*certified], set[tuple[_Point, _Point]]()
     for _ in range(2 * points):
-        apart = _apart(_thin(known, intervals), intervals)
+        apart = _apart(_thin(front, intervals), intervals)
         least = _WIDE if len(apart) >= intervals else 1.0
         wide = {pair: x for pair, x in apart.items() if pair not in empty and x.max() > least}
         if not wide:
@@ -222,16 +222,16 @@ def pareto_front(
             begin, end = (each.values[which] for each in pair)
             level = float(begin + parts // 2 / parts * (end - begin))
             with suppress(CollocError):
-                known.append(optimum(which, level, pair[which]))
-            if pair not in pairwise(_thin(known, intervals)):
+                front.append(optimum(which, level, pair[which]))
+            if pair not in pairwise(_thin(front, intervals)):
                 break
         else:
             empty.add(pair)
     failed = list[tuple[_Point, str]]()
-    for point in _thin(known, intervals):
-        if isinstance(asked := point.source, Problem):
+    for point in _thin(front, intervals):
+        if isinstance(source := point.source, Problem):
             try:
-                solution = solve_member(asked.with_(guess=point.gait), 1)
+                solution = solve_member(source.with_(guess=point.gait), 1)
             except CollocError as error:
                 failed.append((point, str(error)))
                 continue
@@ -261,8 +261,8 @@ def read_front(table: Path, problem: Problem) -> ParetoFront | None:
     if problem.hash not in (each.hash for each in problems):
         return None
     every = (aim for each in problems for aim in (each.objective, *dict(each.at_least)))
-    known = {aim.expression: aim for aim in (*_WAYS, *every)}
-    first, second = (known.get(name) or Objective(name) for name in [*rows[0]][1:3])
+    by_expression = {aim.expression: aim for aim in (*_WAYS, *every)}
+    first, second = (by_expression.get(name) or Objective(name) for name in [*rows[0]][1:3])
     gaps = (Gap(k, row["gap"], True) for k, row in enumerate(rows) if row.get("gap"))
     return ParetoFront(problem, (first, second), points, tuple(gaps))
 
@@ -339,8 +339,8 @@ class Steering:
         begins = dict.fromkeys(self.turns, 0.0)
         gaits = {turn: point.gait for turn, point in zip(self.turns, self.points, strict=True)}
         for turn, inner in _outwards(self.turns, straight):
-            known, angles = gaits[inner].angles(t + begins[inner]), gaits[turn].angles(t)
-            overlap = (np.fft.fft(angles) * np.conj(np.fft.fft(known))).sum(axis=0)
+            there, angles = gaits[inner].angles(t + begins[inner]), gaits[turn].angles(t)
+            overlap = (np.fft.fft(angles) * np.conj(np.fft.fft(there))).sum(axis=0)
             begins[turn] = float(t[np.fft.ifft(overlap).real.argmax()])
         return tuple(begins.values())
 
@@ -435,8 +435,8 @@ def steer(
         )
     check_count(starts=starts)
 
-    def member(turn, stated, starts=starts):
-        solution = solve_member(stated, starts)
+    def member(turn, problem, starts=starts):
+        solution = solve_member(problem, starts)
         if progress is not None:
             progress(turn, solution)
         return solution
@@ -451,18 +451,17 @@ def steer(
     lopsided = one_sided(problem.joint_limit) or (joints is not None and any(joints.rest))
     mirrors = ANTIPODAL in problem.body.symmetries and not lopsided
 
-    def family(stated, wanted, known):
-        """Solve outwards from known members, or from all starts if there is none."""
-        for turn, inner in _outwards(wanted, 0.0):
-            begin = known[inner].gait if inner in known else None
-            if -turn in known and mirrors:
-                begin = known[-turn].gait.mirrored
-            asked = {"gait": anywhere, "rotation": turn, "guess": begin}
+    def family(problem, turns, members):
+        for turn, inner in _outwards(turns, 0.0):
+            begin = members[inner].gait if inner in members else None
+            if -turn in members and mirrors:
+                begin = members[-turn].gait.mirrored
+            changes = {"gait": anywhere, "rotation": turn, "guess": begin}
             if begin is None:
-                known[turn] = member(turn, stated.with_(**asked, delta_start=None))
+                members[turn] = member(turn, problem.with_(**changes, delta_start=None))
             else:
-                known[turn] = member(turn, stated.with_(**asked, delta_start=problem.delta), 1)
-        return tuple(known[turn] for turn in wanted)
+                members[turn] = member(turn, problem.with_(**changes, delta_start=problem.delta), 1)
+        return tuple(members[turn] for turn in turns)
 
     turns, spot = (sorted({float(turn) for turn in each}) for each in (turns, spot))
     points = family(problem, turns, {0.0: straight})

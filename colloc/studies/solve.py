@@ -105,7 +105,7 @@ def solve(
     >>> solution.success, round(solution.efficiency, 2)
     (True, 0.26)
     """
-    stated = _read(problem)
+    file = _read(problem)
     if starts is not None:
         check_count(starts=starts)
     if not seconds > 0:
@@ -114,7 +114,7 @@ def solve(
         raise ProblemError(f"output must name a file, not {shown(str(output))}.")
     path, report = None if output is None else Path(output), reporter(verbose, progress)
     settings: dict[str, Any] = {"seconds": seconds, "search": search, "progress": report}
-    solution = resume(stated, path, starts=starts or stated.starts, **settings)
+    solution = resume(file, path, starts=starts or file.starts, **settings)
     if path is not None:
         save_and_clear(solution, path)
     return solution
@@ -137,16 +137,16 @@ def reporter(verbose: bool, progress: Callable[..., object] | None) -> Callable[
 
 
 def resume(
-    stated: ProblemFile, path: Path | None, *, fresh: bool = False, **settings: Any
+    file: ProblemFile, path: Path | None, *, fresh: bool = False, **settings: Any
 ) -> Solution:
     """Solve with a checkpoint beside the result's path, or from the beginning if `fresh`."""
     keep = None if path is None else run_file(path)
     if fresh and keep is not None:
         keep.unlink(missing_ok=True)
-    solution = search_solve(stated.problem, keep=keep, **settings)
+    solution = search_solve(file.problem, keep=keep, **settings)
     for one in (solution, solution.shrunk):
         if one is not None:
-            one.source = stated.source
+            one.source = file.source
     return solution
 
 
@@ -165,8 +165,8 @@ def checkpoints_in(folder: Path) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt as stop:
-        kept = f"what was found is kept in {folder}; the same command goes on from there."
-        raise KeyboardInterrupt(str(stop) or kept) from None
+        sentence = f"what was found is kept in {folder}; the same command goes on from there."
+        raise KeyboardInterrupt(str(stop) or sentence) from None
     finally:
         _FOLDER.reset(token)
     for file in folder.glob(run_file(Path("member-*.h5")).name):

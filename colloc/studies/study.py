@@ -67,8 +67,8 @@ class Axis:
 
     def __post_init__(self) -> None:
         try:
-            stated = (self.values,) if isinstance(self.values, str) else self.values
-            values = tuple(v if isinstance(v, str) else float(v) for v in stated)
+            sequence = (self.values,) if isinstance(self.values, str) else self.values
+            values = tuple(v if isinstance(v, str) else float(v) for v in sequence)
         except (TypeError, ValueError, OverflowError):
             raise ProblemError(
                 f"values of an axis must be numbers or names, not {self.values!r}."

@@ -214,9 +214,9 @@ def visit(work: Work) -> Visit:
 
     def worth(end):
         if end.delta > problem.delta:  # it would go on as an earlier start did from there
-            known = any(same_gait(problem, end, other) for other in met)
+            is_known = any(same_gait(problem, end, other) for other in met)
             met.append(end)
-            return not known
+            return not is_known
         best = best_attempt(attempts)
         if not end.value > enough():
             return best is None and not work.incumbent
@@ -225,11 +225,11 @@ def visit(work: Work) -> Visit:
         before, now = (fourier_series(problem, gait) for gait in (best.outcome.gait, end.gait))
         return distance(before, now, problem.body, problem.law) > SAME_GAIT
 
-    def solve(origin, gait, stated):
+    def solve(origin, gait, problem):
         key = start_key(gait) + ("r" if origin == RESCUE else "")
         if key in work.tried or key in {a.key for a in attempts}:
             return
-        outcome = run_guess(stated, lambda: gait, len(attempts), work.time_limit, worth=worth)
+        outcome = run_guess(problem, lambda: gait, len(attempts), work.time_limit, worth=worth)
         attempts.append(Attempt(origin, key, outcome))
 
     at_delta = problem.with_(delta_start=problem.delta)
@@ -408,8 +408,8 @@ class StudyRun:
             if not improvable:
                 return
             # all start from what is known now
-            known = {cell: state.best for cell, state in self.cells.items()}
-            waiting = iter([Task(cell, ((self.work(cell, known.get),),)) for cell in improvable])
+            bests = {cell: state.best for cell, state in self.cells.items()}
+            waiting = iter([Task(cell, ((self.work(cell, bests.get),),)) for cell in improvable])
             tasks, total = partial(next, waiting, None), partial(len, improvable)
 
     def work(
@@ -461,7 +461,6 @@ class _Wavefront:
         return None
 
     def finish(self, chunk: Any) -> None:
-        """Release the chunks after one of which all others before them are finished, too."""
         self._finished.add(chunk)
         for following in self._shift(chunk, 1):
             if self._finished.issuperset(self._shift(following, -1)):
@@ -537,7 +536,7 @@ def _row(
     if problem is None:
         return {"status": NO_PROBLEM, "message": state.message}
     outcomes, bound = [a.outcome for a in state.attempts], known_bound(problem)
-    known = [state.scores.get(each.gait_key, math.nan) for each in run.neighbours(cell)]
+    scores = [state.scores.get(each.gait_key, math.nan) for each in run.neighbours(cell)]
     row: dict[str, Any] = {
         "problem_hash": problem.hash,
         "starts": len(outcomes),
@@ -546,7 +545,7 @@ def _row(
         "trivial_bound": 1.0 / problem.law.smallest if rate_independent(problem.law) else np.nan,
         "upper_bound": np.nan if bound is None else bound,
         # largest value here of a neighbour's best gait, projected but not optimised
-        "neighbour_value": max((x for x in known if not math.isnan(x)), default=math.nan),
+        "neighbour_value": max((x for x in scores if not math.isnan(x)), default=math.nan),
     }
     if best is None:
         last = {name: getattr(o, name) for o in outcomes[-1:] for name in ("status", "message")}
@@ -568,8 +567,8 @@ def save_study(
 ) -> Path:
     """Write a table as netCDF-4."""
     facts = {"source": source, "command": command, "versions": json.dumps(versions())}
-    stated = replace(table, attributes=facts | {"Conventions": "CF-1.8"})
-    return save_table(stated, path, KIND, VERSION)
+    facts["Conventions"] = "CF-1.8"
+    return save_table(replace(table, attributes=facts), path, KIND, VERSION)
 
 
 def sweep(

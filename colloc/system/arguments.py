@@ -32,23 +32,23 @@ def named_arguments(cls: type[T]) -> type[T]:
 
     @functools.wraps(init)
     def init_checked(self: T, *values: Any, **named: Any) -> None:
-        stated = _bind(owner, init, (self, *values), named)
-        by_place = list(stated)[1 : len(values) + 1]
-        del stated["self"]
-        scalars, plain = _scalars(init), dict(stated)
+        arguments = _bind(owner, init, (self, *values), named)
+        by_place = list(arguments)[1 : len(values) + 1]
+        del arguments["self"]
+        scalars, plain = _scalars(init), dict(arguments)
         for name, kinds in scalars.items():
             for kind in (float, int, bool):
-                if kind in kinds and name in stated and _fits(stated[name], kind):
-                    plain[name] = kind(stated[name])
+                if kind in kinds and name in arguments and _fits(arguments[name], kind):
+                    plain[name] = kind(arguments[name])
                     break
         try:
             init(self, **plain)
         except ProblemError:
             raise
         except Exception:
-            _check_types(scalars, stated)
+            _check_types(scalars, arguments)
             raise
-        _check_types(scalars, stated)  # last: the class knows better what is wrong
+        _check_types(scalars, arguments)  # last: the class knows better what is wrong
         order = {name: getattr(self, name) for name in ordered}
         if len(set(order.values())) > 1 and order.keys() & by_place:
             read = ", ".join(f"{name}={value:g}" for name, value in order.items())
@@ -79,14 +79,14 @@ def _bind(owner: str, function: Callable[..., Any], values: Any, named: Any) -> 
         return _signature(function).bind(*values, **named).arguments
     except TypeError as error:
         parameters = _signature(function).parameters
-        known = [name for name in parameters if name != "self"]
-        unknown = next((name for name in named if name not in known), "")
+        names = [name for name in parameters if name != "self"]
+        unknown = next((name for name in named if name not in names), "")
         if not unknown or any(each.kind is each.VAR_KEYWORD for each in parameters.values()):
             raise ProblemError(f"{owner}: {error}.") from None
         import difflib
 
-        close = difflib.get_close_matches(unknown, known, n=3, cutoff=0.6)
-        hint = f"did you mean {_or(close)}?" if close else f"it takes {', '.join(known)}."
+        close = difflib.get_close_matches(unknown, names, n=3, cutoff=0.6)
+        hint = f"did you mean {_or(close)}?" if close else f"it takes {', '.join(names)}."
         raise ProblemError(f"{owner} has no argument {unknown!r}; {hint}") from None
 
 
@@ -116,8 +116,8 @@ def _alternatives(kind: Any) -> tuple[Any, ...]:
     return (NoneType if kind is None else kind,)
 
 
-def _check_types(types: Mapping[str, tuple[Any, ...]], stated: Mapping[str, Any]) -> None:
-    for name, value in stated.items():
+def _check_types(types: Mapping[str, tuple[Any, ...]], arguments: Mapping[str, Any]) -> None:
+    for name, value in arguments.items():
         if (allowed := types.get(name)) is not None and not any(
             _fits(value, kind) for kind in allowed
         ):

@@ -65,8 +65,8 @@ def available_threads() -> int:
     """Threads for a batch: ``$OMP_NUM_THREADS``, else all processors; one in a child process."""
     if multiprocessing.parent_process() is not None:
         return 1
-    stated = os.environ.get("OMP_NUM_THREADS", "")
-    return max(1, int(stated)) if stated.isdigit() else available_processes()
+    text = os.environ.get("OMP_NUM_THREADS", "")
+    return max(1, int(text)) if text.isdigit() else available_processes()
 
 
 def one_thread_each() -> None:

@@ -27,8 +27,8 @@ _polled = False  # the innermost `interruptible` polls
 def end_at_once(number: int, frame: FrameType | None) -> None:
     """Handle Ctrl-C in a process that has nothing to lose: one line, and an exit code."""
     if "--json" in sys.argv:
-        said = f'{{"status": "interrupted", "message": "{_NOTHING}", "exit_code": {INTERRUPTED}}}\n'
-        os.write(1, said.encode())
+        line = f'{{"status": "interrupted", "message": "{_NOTHING}", "exit_code": {INTERRUPTED}}}\n'
+        os.write(1, line.encode())
     os.write(2, f"colloc: {_NOTHING}\n".encode())
     os._exit(INTERRUPTED)
 

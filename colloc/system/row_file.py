@@ -26,7 +26,6 @@ _PATIENCE = 60.0  # seconds to wait for other writers, each of which takes milli
 
 @contextlib.contextmanager
 def _transaction(path: Path, kind: str, begin: str) -> Iterator[tuple[sqlite3.Connection, bool]]:
-    """A connection within a transaction, rolled back unless committed; whether there is a table."""
     address = f"{path.absolute().as_uri()}?mode=rw"
     with contextlib.closing(
         sqlite3.connect(address, uri=True, timeout=_PATIENCE, isolation_level=None)

@@ -47,14 +47,14 @@ def open_file(path: str | os.PathLike[str], kind: str, version: int) -> Iterator
     try:
         # files are replaced as a whole, and need no lock, which some file systems do not have
         with h5py.File(path, "r", locking=False) as file:
-            if (stated := attribute(file, "format")) != kind:
-                raise StoreError(f"it is a {stated}.")
-            if (stated := attribute(file, "format_version")) != version:
+            if (text := attribute(file, "format")) != kind:
+                raise StoreError(f"it is a {text}.")
+            if (text := attribute(file, "format_version")) != version:
                 remedy = "Make it again with the command that wrote it"
-                if stated > version:
+                if text > version:
                     remedy = "Update colloc to read it"
                 raise StoreError(
-                    f"its format is {stated}, where this colloc reads {version}. {remedy}."
+                    f"its format is {text}, where this colloc reads {version}. {remedy}."
                 )
             yield file
     except Exception as error:  # h5py raises many kinds for a damaged file

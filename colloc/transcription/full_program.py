@@ -192,8 +192,8 @@ class FullProgram(Program):
         self.add("distance", state @ pick(layout.distance) - RADIANS * rate @ ahead)
         self.add("work", state @ pick(layout.work) - RADIANS * rate @ power)
         integral = sparse.csr_matrix(rate.sum(axis=0))
-        for quantity, total, gained in zip(aims.integrals, layout.totals, densities, strict=True):
-            self.add(quantity.name, pick(total) - RADIANS * integral @ pick(gained))
+        for quantity, total, density in zip(aims.integrals, layout.totals, densities, strict=True):
+            self.add(quantity.name, pick(total) - RADIANS * integral @ pick(density))
         if aims.no_way_across:
             self.add("across", integral @ aside)
 
@@ -469,7 +469,6 @@ class FullProgram(Program):
         self.add("orientation", rows, even, even)
 
     def _ways(self) -> tuple[Any, Any, Any]:
-        """Rows of the velocities ahead and across, and of the power."""
         if self.layout.z.size:
             return tuple(self.pick(self.point[k]) for k in (3, 4, 5))
         mass, angle = self._spread(self.chain.mass_column().T), self.dynamics.regime.ahead
@@ -519,8 +518,6 @@ def _lengths_of_sides(shares: np.ndarray, rates: np.ndarray, p: ca.SX) -> ca.SX:
 
 
 def _square_of_speed(gaits: AnyClass, n_joint: int, p: ca.SX) -> ca.SX:
-    """Square of the root-mean-square shape speed, or of the mean one where the pace does not
-    matter."""
     if not gaits.relative_delta:
         return ca.bilin(ca.DM(gaits.mean_square_rate(n_joint) / RADIANS**2), p, p)
     shares, rates = gaits.side_rates(n_joint)

@@ -79,10 +79,10 @@ class ShapeChecks:
 
     def functions(self, gaits: Any, which: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Functions of a class ``(n_function, n)``, or derivatives, of which shapes are sums."""
-        found, rates = np.array(gaits.functions(times)), which >= self.n_shape
+        values, rates = np.array(gaits.functions(times)), which >= self.n_shape
         if rates.any():
-            found[:, rates] = gaits.functions(times[rates], 1)
-        return found
+            values[:, rates] = gaits.functions(times[rates], 1)
+        return values
 
     def shapes(
         self, gaits: Any, table: np.ndarray, which: np.ndarray, times: np.ndarray

@@ -42,7 +42,7 @@ class Rates(NamedTuple):
     centre: np.ndarray
     """Velocity of the centre of mass in the body frame (complex), turned back evenly by the
     turn."""
-    gained: np.ndarray  # power and densities of k quantities, (1 + k, ...)
+    densities: np.ndarray  # power and densities of k quantities, (1 + k, ...)
 
     def of(self, panels: np.ndarray) -> Rates:
         return Rates(*(each[..., panels, :] for each in self))
@@ -55,21 +55,21 @@ def rates_at(
     delta: float,
     t: np.ndarray,
     *,
-    near: np.ndarray | None = None,
+    guess: np.ndarray | None = None,
     quantities: Sequence[Quantity] = (),
     turn: float = 0.0,
 ) -> Rates:
-    """Velocities of a path at phases t, from tail velocities `near` ``(3, ...)``; without them at
+    """Velocities of a path at phases t, from tail velocities `guess` ``(3, ...)``; without them at
     ascending phases, on one branch in time where several motions are balanced."""
     angles, rates = path(t.ravel())
     at = body, friction, angles, rates, delta
-    solved = body.solve(*at[1:], start=None if near is None else near.reshape(3, -1)).require()
-    if near is None and (start := on_one_branch(*at, solved.z)) is not solved.z:
+    solved = body.solve(*at[1:], start=None if guess is None else guess.reshape(3, -1)).require()
+    if guess is None and (start := on_one_branch(*at, solved.z)) is not solved.z:
         solved = body.solve(*at[1:], start=start).require()
     now = body.motion(*at[1:], solved)
-    seen = Instants(*at, z=now.z, joint_map=getattr(path, "joint_map", None))
-    gained = np.stack([now.power, *(quantity.at(seen)[0] for quantity in quantities)])
-    rows = now.z, (now.centre[0] + 1j * now.centre[1]) * np.exp(-1j * turn * t.ravel()), gained
+    instants = Instants(*at, z=now.z, joint_map=getattr(path, "joint_map", None))
+    densities = np.stack([now.power, *(quantity.at(instants)[0] for quantity in quantities)])
+    rows = now.z, (now.centre[0] + 1j * now.centre[1]) * np.exp(-1j * turn * t.ravel()), densities
     return Rates(*(row.reshape(*row.shape[:-1], *t.shape) for row in rows))
 
 
@@ -106,7 +106,7 @@ def increments(
     other weights are those of an integral over a part of the interval."""
     omega, b = rates.z[2], rule.b if weights is None else weights
     turn = np.exp(1j * h[:, None] * (omega @ rule.A.T))
-    return h * (omega @ b), h * ((turn * rates.centre) @ b), *(h * (rates.gained @ b))
+    return h * (omega @ b), h * ((turn * rates.centre) @ b), *(h * (rates.densities @ b))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ class FineMotion:
         return (
             self.theta[k] + (weights * self.rates.z[2, k]).sum(axis=1),
             self.path[k] + (weights * self._velocity_in_lab[k]).sum(axis=1),
-            *(self.totals[:, k] + (weights * self.rates.gained[:, k]).sum(axis=2)),
+            *(self.totals[:, k] + (weights * self.rates.densities[:, k]).sum(axis=2)),
         )
 
 
@@ -173,36 +173,36 @@ def fine_motion(
     names = "work", *(quantity.name for quantity in quantities)
     counts = dict.fromkeys(names, periods) | {"rotation": 1.0}
     counts["distance"] = periods * chord_per_way(turn)
-    asked: Any = {"quantities": quantities, "turn": turn}
+    how: Any = {"quantities": quantities, "turn": turn}
     left, width = edges[:-1], np.diff(edges)
     nodes = left[:, None] + width[:, None] * PANEL_RULE.c
-    rates, gap = rates_at(body, friction, path, delta, nodes, **asked), np.full(left.size, np.inf)
+    rates, gap = rates_at(body, friction, path, delta, nodes, **how), np.full(left.size, np.inf)
     parts = increments(PANEL_RULE, width, rates)
     while True:
         # halve the panels that hold the excess over the tolerance
         order = np.argsort(gap)[::-1]
         tail = np.cumsum(gap[order][::-1])[::-1]
-        chosen = np.sort(order[(tail > tolerance) & (width[order] > _NARROWEST)])
-        if chosen.size == 0 or left.size + chosen.size > _MOST_PANELS:
+        halve = np.sort(order[(tail > tolerance) & (width[order] > _NARROWEST)])
+        if halve.size == 0 or left.size + halve.size > _MOST_PANELS:
             break
-        half, start = 0.5 * np.repeat(width[chosen], 2), np.repeat(left[chosen], 2)
+        half, start = 0.5 * np.repeat(width[halve], 2), np.repeat(left[halve], 2)
         start[1::2] += half[1::2]
-        wanted = start[:, None] + half[:, None] * PANEL_RULE.c
+        phases = start[:, None] + half[:, None] * PANEL_RULE.c
         if friction.associated:
-            near = (rates.z[:, chosen] @ _TO_HALVES.T).reshape(3, start.size, -1)
+            guess = (rates.z[:, halve] @ _TO_HALVES.T).reshape(3, start.size, -1)
         else:  # no mean of branches is near any of them
             nodes = left[:, None] + width[:, None] * PANEL_RULE.c
-            before = np.maximum(np.searchsorted(nodes.ravel(), wanted) - 1, 0)
-            near = rates.z.reshape(3, -1)[:, before]
-        new = rates_at(body, friction, path, delta, wanted, near=near, **asked)
+            before = np.maximum(np.searchsorted(nodes.ravel(), phases) - 1, 0)
+            guess = rates.z.reshape(3, -1)[:, before]
+        new = rates_at(body, friction, path, delta, phases, guess=guess, **how)
         # the whole panel, and its polynomials half way, against the two halves
         first, second = ([x[k::2] for x in increments(PANEL_RULE, half, new)] for k in (0, 1))
         second[1] = np.exp(1j * first[0]) * second[1]
-        middle = increments(PANEL_RULE, width[chosen], rates.of(chosen), _TO_MIDDLE)
-        whole = (part[chosen] for part in parts)
+        middle = increments(PANEL_RULE, width[halve], rates.of(halve), _TO_MIDDLE)
+        whole = (part[halve] for part in parts)
         at_end = [a + b - both for a, b, both in zip(first, second, whole, strict=True)]
         half_way = [a - both for a, both in zip(first, middle, strict=True)]
-        rest = np.delete(np.arange(left.size), chosen)
+        rest = np.delete(np.arange(left.size), halve)
         place = np.argsort(np.concatenate([left[rest], start]))
         left, width = (
             np.concatenate([old[rest], added])[place]
@@ -214,10 +214,10 @@ def fine_motion(
         theta, way, totals = _cumulative(parts)
         share = {"distance": 1.0}
         if objective is not None:
-            passed = dict(zip(names, totals[:, -1], strict=True))
-            passed |= {"distance": max(abs(way[-1]), 1e-300), "rotation": theta[-1] + turn}
-            passed["work"] = max(passed["work"], 1e-300)
-            share = objective.shares({x: counts[x] * value for x, value in passed.items()})
+            values = dict(zip(names, totals[:, -1], strict=True))
+            values |= {"distance": max(abs(way[-1]), 1e-300), "rotation": theta[-1] + turn}
+            values["work"] = max(values["work"], 1e-300)
+            share = objective.shares({x: counts[x] * value for x, value in values.items()})
             share = {x: abs(counts[x] * share[x]) for x in counts}
         on_spin = share["distance"] * np.abs(way - way[-1]).max() + share.get("rotation", 0.0)
         weights = [on_spin, share["distance"], *(share.get(name, 0.0) for name in names)]
@@ -272,8 +272,8 @@ class Replay(Period):
 
     def tail_velocity(self, t: np.ndarray) -> np.ndarray:
         """Tail velocities ``(3, n_time)`` interpolated at phases t."""
-        known, z = self.tail
-        return np.stack([np.interp(t, known, row, period=1.0) for row in z])
+        phases, z = self.tail
+        return np.stack([np.interp(t, phases, row, period=1.0) for row in z])
 
     @property
     def value(self) -> float:
@@ -295,29 +295,29 @@ def to_tolerance(
     first: float,
     objective: Objective,
     tolerance: float,
-    known: tuple[Numbers, Numbers],
+    others: tuple[Numbers, Numbers],
     errors_of: Callable[[Ran, Ran], Numbers] | None = None,
 ) -> tuple[Ran, Numbers, Numbers]:
     """Solve a differential equation with ever smaller errors a step until these change an objective
     by less than a relative error: the last run, its numbers and their errors.
 
-    `run` takes an error, `first` to begin with; `known` are other numbers and their errors;
+    `run` takes an error, `first` to begin with; `others` are other numbers and their errors;
     `errors_of` compares a run with one of ten times the error: by default their difference, but
     half of the error at least, as differences vanish now and then. `NotConvergedError` if rounding
     hides the accuracy.
     """
     aim, before = max(first, LEAST / _TENTH), None
     while aim > 0.5 * LEAST:
-        ran, now = run(aim)
+        motion, now = run(aim)
         if before is not None:
             if errors_of is None:
                 errors = {x: max(abs(now[x] - before[1][x]), 0.5 * aim) for x in now}
             else:
-                errors = dict.fromkeys(now, 0.0) | errors_of(ran, before[0])
-            values, errors = now | known[0], errors | known[1]
+                errors = dict.fromkeys(now, 0.0) | errors_of(motion, before[0])
+            values, errors = now | others[0], errors | others[1]
             if not objective.relative_error(values, errors) > tolerance:
-                return ran, values, errors
-        aim, before = _TENTH * aim, (ran, now)
+                return motion, values, errors
+        aim, before = _TENTH * aim, (motion, now)
     raise NotConvergedError(
         f"the motion cannot be replayed to a relative error of {tolerance:.0e}."
     )

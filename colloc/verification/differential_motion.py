@@ -109,7 +109,7 @@ class _Integrals:
     ) -> None:
         self._densities = densities
         left, right = edges[:-1], edges[1:]
-        whole, lefts, gained = self._panel_sums(left, right), list[np.ndarray](), list[np.ndarray]()
+        whole, lefts, sums = self._panel_sums(left, right), list[np.ndarray](), list[np.ndarray]()
         while left.size:
             middle = 0.5 * (left + right)
             each = np.column_stack([left, middle]).ravel(), np.column_stack([middle, right]).ravel()
@@ -119,13 +119,13 @@ class _Integrals:
             off = changed > error * np.maximum(right - left, _KINK)
             off &= right - left > 2 * _NARROWEST
             lefts.append(left[~off])
-            gained.append(both[:, ~off])
+            sums.append(both[:, ~off])
             again = np.repeat(off, 2)
             (left, right), whole = (edge[again] for edge in each), parts[:, again]
         begin = np.concatenate(lefts)
         order = np.argsort(begin)
         self._begin = begin[order]
-        self._before = np.cumsum(np.pad(np.hstack(gained)[:, order], ((0, 0), (1, 0))), axis=1)
+        self._before = np.cumsum(np.pad(np.hstack(sums)[:, order], ((0, 0), (1, 0))), axis=1)
 
     def _panel_sums(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
         t = (left[:, None] + (right - left)[:, None] * PANEL_RULE.c).ravel()
@@ -163,19 +163,19 @@ def integrate_period(
     """
     from scipy.integrate import solve_ivp
 
-    near: Any = None
+    memory: Any = None
     first = last = left = 0.0
 
     def inside(t):
         return min(max(t, first + ONE_SIDED), last - ONE_SIDED)  # rates may jump at the ends
 
     def slope(t, state):
-        nonlocal near, left
+        nonlocal memory, left
         left -= 1
         if left < 0:
             raise _TooOften
-        found, near = rates(inside(t), state, near)
-        return found
+        slopes, memory = rates(inside(t), state, memory)
+        return slopes
 
     exact = jacobian and (lambda t, state: jacobian(inside(t), state))
 
@@ -249,8 +249,6 @@ def _through_periods(
 
 
 class _Gait:
-    """A gait of a chain whose motion has states."""
-
     def __init__(
         self, body: Chain, friction: Law, path: Path, delta: float, breaks: _Breaks,
         quantities: Iterable[Quantity],
@@ -263,29 +261,28 @@ class _Gait:
         """Instants at phases where the motion has the states ``(n_state, n)``."""
         raise NotImplementedError
 
-    def integrals(self, ran: Course, error: float, motion: int = 0) -> _Integrals:
+    def integrals(self, course: Course, error: float, motion: int = 0) -> _Integrals:
         """Of quantities that need forces, along one of the motions of a run."""
 
         def densities(t):
             if not self.quantities:
                 return np.empty((0, t.size))
-            now = self.instants(t, ran.at(t)[7 * motion :])
+            now = self.instants(t, course.at(t)[7 * motion :])
             return np.stack([each.at(now)[0] for each in self.quantities])
 
-        edges = np.union1d(ran.phases[::_TOGETHER], [0.0, 1.0])
+        edges = np.union1d(course.phases[::_TOGETHER], [0.0, 1.0])
         return _Integrals(densities, edges, error)
 
     def measured(
-        self, ran: Course, z: np.ndarray, values: Numbers, errors: Numbers, objective: Objective,
+        self, course: Course, z: np.ndarray, values: Numbers, errors: Numbers, objective: Objective,
         limits: PathLimits, **more: Any,
     ) -> Replay:  # fmt: skip
-        """The record of a run through a cycle, at whose phases the tail's velocities are z."""
-        angles, _ = self.path(t := ran.phases % 1.0)
+        angles, _ = self.path(t := course.phases % 1.0)
         shares = np.empty(0)
         if limits.names:  # of torques, perhaps, which are infinite at corners
-            shares = limits.sizes(limits.at(self.instants(t, ran.states))).max(axis=1)
+            shares = limits.sizes(limits.at(self.instants(t, course.states))).max(axis=1)
         error = float(objective.relative_error(values, errors))
-        more |= {"lever": lever(self.body, angles), "tail": (ran.phases, z), "shares": shares}
+        more |= {"lever": lever(self.body, angles), "tail": (course.phases, z), "shares": shares}
         return Replay(values, errors, **more, objective=objective, error=error, instants=t.size)
 
 
@@ -347,9 +344,9 @@ class GaitOnSlope(_Gait):
     ) -> Course:
         """The states through a cycle, from the first of them at its begin."""
 
-        def rates(t, state, near):
+        def rates(t, state, guess):
             at = self.body, self.friction, self.slope, (*self.path(np.array([t])), self.delta)
-            solved, now, _, by_theta = balance_on_slope(*at, state[:1], start=near)
+            solved, now, _, by_theta = balance_on_slope(*at, state[:1], start=guess)
             if not solved.converged.all():
                 raise NotConvergedError(
                     f"no balance at phase {t:.4f} on a slope of grade {self.slope.grade:g} "
@@ -383,7 +380,7 @@ class GaitOnSlope(_Gait):
         return float(np.diff(phases) @ (0.5 * several[1:] + 0.5 * several[:-1])) / float(phases[-1])
 
     def replay(
-        self, objective: Objective, tolerance: float, known: Any, limits: PathLimits, instants: int
+        self, objective: Objective, tolerance: float, extra: Any, limits: PathLimits, instants: int
     ) -> Replay:
         """A cycle of a gait that says where it points: the distance is the way in the direction
         that counts, the work that of the joints."""
@@ -391,23 +388,23 @@ class GaitOnSlope(_Gait):
         theta_0 = self.path.theta  # type: ignore[attr-defined]
 
         def run(aim):
-            ran = self.integrate(theta_0, aim, _LONGEST / instants)
-            theta, climb, aside, spent, *_ = (ran.states[:, -1] - ran.states[:, 0]).tolist()
+            motion = self.integrate(theta_0, aim, _LONGEST / instants)
+            theta, climb, aside, spent, *_ = (motion.states[:, -1] - motion.states[:, 0]).tolist()
             way = self.slope.travel_along(complex(climb, aside))
             work = spent + self.slope.grade * climb
             numbers = {"distance": way.real, "work": work, "rotation": theta}
-            sums = zip(self.quantities, self.integrals(ran, aim).whole.tolist(), strict=True)
-            return (ran, way.imag), numbers | {each.name: total for each, total in sums}
+            sums = zip(self.quantities, self.integrals(motion, aim).whole.tolist(), strict=True)
+            return (motion, way.imag), numbers | {each.name: total for each, total in sums}
 
         first = _FIRST * tolerance
-        (ran, across), values, errors = to_tolerance(run, first, objective, tolerance, known)
-        now, residual = self.balanced(ran.phases % 1.0, ran.states[0])
+        (motion, across), values, errors = to_tolerance(run, first, objective, tolerance, extra)
+        now, residual = self.balanced(motion.phases % 1.0, motion.states[0])
         return self.measured(
-            *(ran, now.z, values, errors, objective, limits),
+            *(motion, now.z, values, errors, objective, limits),
             others={},
-            actuator_work=float(ran.states[4, -1]),
+            actuator_work=float(motion.states[4, -1]),
             residual=float(residual.max()),
-            several=self.several(ran.phases, ran.states[0]),
+            several=self.several(motion.phases, motion.states[0]),
             across=across,
         )
 
@@ -510,7 +507,7 @@ class PeriodicRun(NamedTuple):
     course: Course
     momenta: np.ndarray
     """At the start of one that would close the gap that is left: where a body glides far they are
-    much further away than the gap is wide."""
+    much extra away than the gap is wide."""
     aim: float
     sums: np.ndarray = np.empty(0)  # of quantities, (k,)
 
@@ -610,38 +607,38 @@ class GaitWithInertia(_Gait):
             **{each.name: float(change[7 + k]) for k, each in enumerate(self.quantities)},
         }
 
-    def rough_period(self, near: np.ndarray) -> RoughPeriod:
+    def rough_period(self, guess: np.ndarray) -> RoughPeriod:
         """By Newton's method, with derivatives from three runs beside each one."""
-        start, begin = near, np.zeros((4, 7))
+        start, begin = guess, np.zeros((4, 7))
         for _ in range(_MOST_STEPS):
             begin[:, _MOMENTA] = start + np.vstack([np.zeros(3), _APART * np.eye(3)])
             begin[:, _THETA] = self.theta
-            ran = self.run(begin, self._rough)
-            end = ran.states[:, -1].reshape(begin.shape)
+            motion = self.run(begin, self._rough)
+            end = motion.states[:, -1].reshape(begin.shape)
             first, *others = end[:, _MOMENTA]
             step = _newton_step(first - start, np.subtract(others, first).T / _APART)
             start = start + step
             if np.abs(step).max() < _LEFT_OPEN * self._rough:
-                sums = [self.integrals(ran, self._rough, k).whole for k in range(len(begin))]
+                sums = [self.integrals(motion, self._rough, k).whole for k in range(len(begin))]
                 end = np.column_stack([end, sums])
                 before = np.pad(begin[0], (0, len(self.quantities)))
                 slopes = (end[1:] - end[0]).T / _APART
                 return RoughPeriod(start, np.column_stack([before, end[0]]), slopes)
         raise self._not_alike()
 
-    def find_period(self, near: np.ndarray | None = None) -> RoughPeriod:
+    def find_period(self, guess: np.ndarray | None = None) -> RoughPeriod:
         """`rough_period` near some momenta; else near the quasi-static ones, or none: a body that
         friction hardly brakes keeps what it begins with."""
-        if near is not None:
+        if guess is not None:
             with suppress(NotConvergedError):
-                return self.rough_period(near)
+                return self.rough_period(guess)
         with suppress(NotConvergedError):
             return self.rough_period(self.momenta())
         return self.rough_period(np.zeros(3))
 
-    def periodic_run(self, near: np.ndarray, aim: float, slopes: np.ndarray) -> PeriodicRun:
+    def periodic_run(self, guess: np.ndarray, aim: float, slopes: np.ndarray) -> PeriodicRun:
         """To an error `aim`, from the momenta and slopes of a `RoughPeriod`."""
-        start, before = near, np.inf
+        start, before = guess, np.inf
         for _ in range(_MOST_STEPS):
             course = self.run(start, aim)
             gap = course.states[_MOMENTA, -1] - start
@@ -658,7 +655,7 @@ class GaitWithInertia(_Gait):
             f"alike; try a smaller one."
         )
 
-    def errors(self, ran: PeriodicRun, before: PeriodicRun, slopes: np.ndarray) -> Numbers:
+    def errors(self, motion: PeriodicRun, before: PeriodicRun, slopes: np.ndarray) -> Numbers:
         """Errors of the `totals` of a run, seen from one whose steps might err more.
 
         From a start s a run ends at F(s) + e, F being the exact map of a cycle. The true motion
@@ -669,9 +666,9 @@ class GaitWithInertia(_Gait):
         A bound of e is the difference of the ends of both runs, had they had one start, but the aim
         at least, as differences vanish now and then.
         """
-        (first, last), (other, end) = (each.ends.T for each in (ran, before))
-        steps = np.maximum(np.abs(end - last - slopes @ (other - first)[_MOMENTA]), ran.aim)
-        return self.changes(ran.ends, slopes, steps, np.abs(last - first)[_MOMENTA])
+        (first, last), (other, end) = (each.ends.T for each in (motion, before))
+        steps = np.maximum(np.abs(end - last - slopes @ (other - first)[_MOMENTA]), motion.aim)
+        return self.changes(motion.ends, slopes, steps, np.abs(last - first)[_MOMENTA])
 
     def changes(
         self, ends: np.ndarray, slopes: np.ndarray, steps: np.ndarray, gap: np.ndarray
@@ -684,8 +681,8 @@ class GaitWithInertia(_Gait):
         return {x: sum(abs(other[x] - value) for other in changed) for x, value in totals.items()}
 
     def replay(
-        self, objective: Objective, tolerance: float, known: Any, limits: PathLimits,
-        near: Replay | None,
+        self, objective: Objective, tolerance: float, extra: Any, limits: PathLimits,
+        guess: Replay | None,
     ) -> Replay:  # fmt: skip
         """The period that leaves the momenta as they are, on a slope as of `slope_motion`.
 
@@ -693,25 +690,25 @@ class GaitWithInertia(_Gait):
         that against friction and what the body gains in kinetic energy.
         """
         check_finite(positive=True, froude=self.froude, delta=self.delta)
-        begin = None if near is None else self.momenta(near.tail_velocity(np.zeros(1)))
+        begin = None if guess is None else self.momenta(guess.tail_velocity(np.zeros(1)))
         start, ends, slopes = self.find_period(begin)
         period = {"period": self.froude**-0.5}
 
         def run(aim):
             nonlocal start
-            ran = self.periodic_run(start, aim, slopes)
-            start = ran.momenta
-            return ran, self.totals(ran.ends) | period
+            motion = self.periodic_run(start, aim, slopes)
+            start = motion.momenta
+            return motion, self.totals(motion.ends) | period
 
         # runs that cannot be the last but one are left out
         usual = self.changes(ends, slopes, np.full(len(ends), _USUAL * tolerance), np.zeros(3))
-        lost = objective.relative_error(self.totals(ends) | period | known[0], usual)
-        first = tolerance / max(1.0, lost / tolerance)
+        error = objective.relative_error(self.totals(ends) | period | extra[0], usual)
+        first = tolerance / max(1.0, error / tolerance)
         errors_of = partial(self.errors, slopes=slopes)
-        ran, values, errors = to_tolerance(run, first, objective, tolerance, known, errors_of)
-        phases, states, _ = ran.course
+        motion, values, errors = to_tolerance(run, first, objective, tolerance, extra, errors_of)
+        phases, states, _ = motion.course
         from_rest = states[_MOMENTA, 0]
-        if near is None or near.several:
+        if guess is None or guess.several:
             with suppress(NotConvergedError):  # Newton's method need not lead to any from there
                 from_rest = self.rough_period(np.zeros(3)).momenta
         several = float(np.abs(from_rest - states[_MOMENTA, 0]).max() > _OTHER)
@@ -726,7 +723,7 @@ class GaitWithInertia(_Gait):
         energy = self.froude * kinetic_energy(*shapes, z)[0]
         change = states[:, -1] - states[:, 0]
         return self.measured(
-            *(ran.course, z, values, errors, objective, limits),
+            *(motion.course, z, values, errors, objective, limits),
             others=others,
             actuator_work=values["work"] + float(energy[-1] - energy[0]),
             residual=float(np.abs(change[_MOMENTA]).max()),

@@ -102,7 +102,7 @@ class ReferenceMotion(NamedTuple):
     the whole motion."""
 
 
-class Known(NamedTuple):
+class Reference(NamedTuple):
     """A gait, delta per period, and its motion (`gait_motion`)."""
 
     control: ControlProblem
@@ -129,11 +129,11 @@ def gait_motion(
     error = tolerance / counts if np.isfinite(counts) else tolerance
     if hasattr(regime, "reference"):
         return regime.reference(control, gait, delta, mesh, error)
-    asked = control.aims.integrals
+    integrals = control.aims.integrals
     if regime.froude:
         paced = regime.at(gait)
         how: Any = {"froude": paced.froude, "turn": kind.turn, "regime": paced}
-        moving = GaitWithInertia(body, law, gait, delta, quantities=asked, **how)
+        moving = GaitWithInertia(body, law, gait, delta, quantities=integrals, **how)
         begin, _, slopes = moving.rough_period(along.edges[:, 0])
         times = 1.0 + np.abs(amplification(slopes)).sum(axis=1).max()
         run = moving.periodic_run(begin, max(error / times, LEAST), slopes)
@@ -141,9 +141,9 @@ def gait_motion(
         sums = moving.integrals(run.course, run.aim)
         return ReferenceMotion(run.course.at, times * run.aim, sums, by_interval)
     if regime.slides:
-        on = GaitOnSlope(body, law, gait, delta, regime, gait.corner_phases, asked)
-        ran = on.integrate(gait.theta, error)
-        return ReferenceMotion(lambda t: ran.at(t)[:4], error, on.integrals(ran, error))
+        on = GaitOnSlope(body, law, gait, delta, regime, gait.corner_phases, integrals)
+        motion = on.integrate(gait.theta, error)
+        return ReferenceMotion(lambda t: motion.at(t)[:4], error, on.integrals(motion, error))
     raise NotImplementedError(
         f"no differential equation is known for {type(regime).__name__}: give it a reference."
     )
@@ -161,19 +161,19 @@ def mesh_error(
     need not be exact. `NotConvergedError` without a balance."""
     if fine is None:
         fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
-    known, kind = Known(control, gait, delta, fine), control.dynamics
+    reference, kind = Reference(control, gait, delta, fine), control.dynamics
     violation = constraint_violation(control.admissible, mesh, gait)
     if kind.followed:
-        return MeshError(**_errors_with_states(known, mesh), violation=violation)
-    value, turning, pose, gained = _collocated_cells(
-        known, mesh.scheme, mesh.edges[:-1], mesh.edges[1:]
+        return MeshError(**_errors_with_states(reference, mesh), violation=violation)
+    value, turning, pose, integrals = _collocated_cells(
+        reference, mesh.scheme, mesh.edges[:-1], mesh.edges[1:]
     )
     objective, rotation = control.aims.objective, pose.theta[-1] - kind.turn
-    _, seen = _period(control, pose.place[-1], rotation, gained)
+    _, on_mesh = _period(control, pose.place[-1], rotation, integrals)
     return MeshError(
         value=value,
         violation=violation,
-        total=objective(seen) / objective(_exact(known)[1]) - 1,
+        total=objective(on_mesh) / objective(_exact(reference)[1]) - 1,
         unresolved=float(fine.unresolved.sum()),
         turning=abs(float(turning.sum())),
     )
@@ -181,72 +181,76 @@ def mesh_error(
 
 def _first_order(
     control: ControlProblem,
-    passed: PeriodTotals,
+    cycle: PeriodTotals,
     period: Mapping[str, float],
     rotation: np.ndarray,
     displacement: np.ndarray,
-    gained: np.ndarray,
+    integrals: np.ndarray,
 ) -> np.ndarray:
-    """Relative changes of the objective by errors of intervals: `displacement` at the end, `gained`
-    work and integrals ``(1 + k, n)``."""
+    """Relative changes of the objective by errors of intervals: `displacement` at the end,
+    `integrals` work and others ``(1 + k, n)``."""
     kind, weights = control.dynamics, control.aims.objective.shares(period)
     value = np.zeros(rotation.size)
-    for name, share in kind.total_gradients(passed).items():
+    for name, share in kind.total_gradients(cycle).items():
         way = (np.conj(share.side) * displacement).real
-        value += weights.get(name, 0.0) * (way + share.rotation * rotation + share.work * gained[0])
-    for each, error in zip(control.aims.integrals, gained[1:], strict=True):
+        value += weights.get(name, 0.0) * (
+            way + share.rotation * rotation + share.work * integrals[0]
+        )
+    for each, error in zip(control.aims.integrals, integrals[1:], strict=True):
         value += weights[each.name] * kind.periods * error
     return value
 
 
 def _collocated_cells(
-    known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray
+    reference: Reference, rule: Scheme, left: np.ndarray, right: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, CollocatedPose, np.ndarray]:
     """What intervals add to the error of the objective and to the turning; pose, work and integrals
     ``(1 + k,)``."""
-    (control, gait, delta, fine), h = known, right - left
+    (control, gait, delta, fine), h = reference, right - left
     nodes, kind = left[:, None] + h[:, None] * rule.c, control.dynamics
     how: Any = {"quantities": control.aims.integrals, "turn": kind.turn}
-    near = fine.velocity(nodes)
-    rates = rates_at(kind.body, kind.law, gait, delta, nodes, near=near, **how)
+    guess = fine.velocity(nodes)
+    rates = rates_at(kind.body, kind.law, gait, delta, nodes, guess=guess, **how)
     pose = CollocatedPose(rule, h, rates.z[2], rates.centre)
-    totals = (h[:, None] * rule.b * rates.gained).sum(axis=2)
+    totals = (h[:, None] * rule.b * rates.densities).sum(axis=2)
     (theta, path, *before), (theta_right, path_right, *after) = fine.at(left), fine.at(right)
     rotation = pose.rotations - (theta_right - theta)
-    gained = totals - (np.array(after) - np.array(before))
+    excess = totals - (np.array(after) - np.array(before))
     displacement = pose.displacements * np.exp(1j * theta) - (path_right - path)
     # an error of rotation turns everything after it
     added = displacement + 1j * rotation * (fine.path[-1] - path_right)
-    value = _first_order(control, *_exact(known), rotation, added, gained)
+    value = _first_order(control, *_exact(reference), rotation, added, excess)
     closed = control.admissible.gait.symmetry != NONE
     turning = rotation * (0.0 if closed else 0.5 / abs(fine.path[-1]))
     return value, turning, pose, totals.sum(axis=1)
 
 
-def interval_shares(known: Known, rule: Scheme, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+def interval_shares(
+    reference: Reference, rule: Scheme, left: np.ndarray, right: np.ndarray
+) -> np.ndarray:
     """Magnitudes of what intervals add to the relative error of the objective and to the
     turning."""
-    value, turning, *_ = _collocated_cells(known, rule, left, right)
+    value, turning, *_ = _collocated_cells(reference, rule, left, right)
     return np.abs(value) + np.abs(turning)
 
 
 def _period(
-    control: ControlProblem, end: complex, rotation: float, gained: np.ndarray, static: Any = ()
+    control: ControlProblem, end: complex, rotation: float, integrals: np.ndarray, static: Any = ()
 ) -> tuple[PeriodTotals, dict[str, float]]:
     """The solved part, and quantities of the period, from work and integrals ``(1 + k,)``."""
-    kind, (work, *sums) = control.dynamics, gained.tolist()
-    passed = PeriodTotals(complex(end), float(rotation), work, static)
+    kind, (work, *sums) = control.dynamics, integrals.tolist()
+    cycle = PeriodTotals(complex(end), float(rotation), work, static)
     more = zip(control.aims.integrals, sums, strict=True)
-    return passed, kind.totals(passed) | {each.name: kind.periods * total for each, total in more}
+    return cycle, kind.totals(cycle) | {each.name: kind.periods * total for each, total in more}
 
 
-def _exact(known: Known) -> tuple[PeriodTotals, dict[str, float]]:
-    fine, turn = known.fine, known.control.dynamics.turn
-    return _period(known.control, fine.path[-1], fine.theta[-1] - turn, fine.totals[:, -1])
+def _exact(reference: Reference) -> tuple[PeriodTotals, dict[str, float]]:
+    fine, turn = reference.fine, reference.control.dynamics.turn
+    return _period(reference.control, fine.path[-1], fine.theta[-1] - turn, fine.totals[:, -1])
 
 
 def _collocate(
-    control: ControlProblem, mesh: Mesh, gait: Any, delta: float, near: np.ndarray | None = None
+    control: ControlProblem, mesh: Mesh, gait: Any, delta: float, guess: np.ndarray | None = None
 ) -> tuple[Shapes, Trajectory, CollocatedPose, np.ndarray, dict[str, float]]:
     """A gait on a mesh: work and integrals of intervals ``(1 + k, n)``, quantities of the
     period."""
@@ -254,7 +258,7 @@ def _collocate(
     angles, rates = gait(mesh.times)
     shapes = Shapes(angles, rates, delta)
     static = np.array([getattr(gait, each.name) for each in kind.static_parameters])
-    along = kind.simulate(mesh, shapes, static, near)
+    along = kind.simulate(mesh, shapes, static, guess)
     theta = kind.initial_heading(along.static)
     pose = CollocatedPose.on_mesh(mesh, along.now.z[OMEGA] - kind.turn, along.now.centre, theta)
     now = kind.instants(shapes, pose.theta_on(mesh), along.now.z)
@@ -263,16 +267,16 @@ def _collocate(
         at = kind.chain, kind.law, gait, mesh.times, along.states[: len(STATES)]
         now = replace(now, moments=joint_torques(*at, **how), froude=how["froude"])
     densities = along.now.power, *(each.at(now)[0] for each in control.aims.integrals)
-    gained = np.array([(weights * each[mesh.points]).sum(axis=1) for each in densities])
-    totals = pose.place[-1], pose.rotations.sum(), gained.sum(axis=1), along.static
-    return shapes, along, pose, gained, _period(control, *totals)[1]
+    integrals = np.array([(weights * each[mesh.points]).sum(axis=1) for each in densities])
+    totals = pose.place[-1], pose.rotations.sum(), integrals.sum(axis=1), along.static
+    return shapes, along, pose, integrals, _period(control, *totals)[1]
 
 
-def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
-    (control, gait, delta, exact), kind = known, known.control.dynamics
+def _errors_with_states(reference: Reference, mesh: Mesh) -> dict[str, Any]:
+    (control, gait, delta, exact), kind = reference, reference.control.dynamics
     # momenta, perhaps theta
-    at_edges, near = exact.at(mesh.edges), exact.at(mesh.times)[: len(kind.states)]
-    shapes, along, pose, gained, seen = _collocate(control, mesh, gait, delta, near)
+    at_edges, guess = exact.at(mesh.edges), exact.at(mesh.times)[: len(kind.states)]
+    shapes, along, pose, integrals, on_mesh = _collocate(control, mesh, gait, delta, guess)
     objective = control.aims.objective
     angle, *place = at_edges[-4:-1]
     theta, x, y, work = np.diff(at_edges[-4:], axis=1)
@@ -285,31 +289,31 @@ def _errors_with_states(known: Known, mesh: Mesh) -> dict[str, Any]:
     )
     true = np.array([work, *more])
     totals = x.sum() + 1j * y.sum(), theta.sum(), true.sum(axis=1), along.static
-    passed, period = _period(control, *totals)
+    cycle, period = _period(control, *totals)
     weights, rotation = objective.shares(period), pose.rotations - theta
     displacement = np.diff(pose.place) - (x + 1j * y)
     turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     by_states: Any = 0.0
     if exact.solve_intervals is not None:
         states = at_edges[: len(kind.states)]
-        out, ends, solved = exact.solve_intervals(mesh, shapes, along, states[:, :-1], near)
+        out, ends, solved = exact.solve_intervals(mesh, shapes, along, states[:, :-1], guess)
         local = CollocatedPose.on_mesh(mesh, out[OMEGA] - kind.turn, out[3:5])
         rotation = local.rotations - theta
-        gained[0] = (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1)
+        integrals[0] = (stage_weights(mesh) * out[5][mesh.points]).sum(axis=1)
         displacement = np.exp(1j * angle[:-1]) * local.displacements - (x + 1j * y)
         if not kind.states[3:]:  # an error of rotation turns everything after it
             path = place[0] + 1j * place[1]
             displacement += 1j * rotation * (path[-1] - path[1:])
-        shares, (_, on_states) = kind.total_gradients(passed), along.slopes()
+        shares, (_, on_states) = kind.total_gradients(cycle), along.slopes()
         *_, on_ends = kind.vjp(mesh, pose, shares.values(), on_states)
         counts = np.array([weights.get(name, 0.0) for name in shares])
         by_states = np.einsum("m,mkn,kn->n", counts, on_ends, ends - states[:, 1:])
         by_states[~solved] = 1.0
-    off = gained - true
-    value = by_states + _first_order(control, passed, period, rotation, displacement, off)
+    off = integrals - true
+    value = by_states + _first_order(control, cycle, period, rotation, displacement, off)
     return {
-        "value": value if along.held.all() else np.nan * value,
-        "total": float(objective(seen) / objective(period) - 1),
+        "value": value if along.exist.all() else np.nan * value,
+        "total": float(objective(on_mesh) / objective(period) - 1),
         "unresolved": float(exact.error * sum(map(abs, weights.values()))),
         "turning": turned if control.admissible.gait.symmetry == NONE else 0.0,
     }
@@ -319,11 +323,11 @@ def constraint_violation(admissible: Admissible, mesh: Mesh, gait: AnyGait) -> n
     """Largest excess over a joint limit or penetration of links in each interval; 0 if none."""
     t = (mesh.edges[:-1, None] + mesh.h[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)).ravel()
     angles, body = gait.angles(t), admissible.body
-    stretched, limit = under_one_limit(angles, admissible.joint_limit)
+    angles_at, limit = under_one_limit(angles, admissible.joint_limit)
     rows = [
-        np.abs(body.bounded_angles.rows @ stretched).max(axis=0, initial=0.0) - limit,
+        np.abs(body.bounded_angles.rows @ angles_at).max(axis=0, initial=0.0) - limit,
         crossing_depth(body, angles, far_pairs(body)),
-        *(near.excess(angles)[0] for near in body.contacts()),
+        *(contact.excess(angles)[0] for contact in body.contacts()),
     ]
     return np.maximum(np.max(rows, axis=0), 0.0).reshape(mesh.n, -1).max(axis=1)
 
@@ -334,7 +338,7 @@ class MeshPlan:
     edges: np.ndarray  # (n + 1,)
     estimate: float  # relative error of the gait's value
     reached: bool  # whether that is below the request
-    kept: np.ndarray  # phases that have to stay knots, as they split violating intervals
+    knots: np.ndarray  # phases that have to stay knots, as they split violating intervals
 
     @property
     def points(self) -> float:
@@ -368,21 +372,23 @@ def kink_phases(
     centre, least = t[index + 1], inner[link, index]
     radius, rows = np.maximum(t[index + 2] - centre, centre - t[index]), np.arange(centre.size)
     for _ in range(_ZOOMS if centre.size else 0):
-        near = centre[:, None] + radius[:, None] * np.linspace(-1, 1, _PLACES)
-        z = rates_at(body, friction, path, delta, near, near=fine.velocity(near)).z.reshape(3, -1)
-        sampled = slowness(near.ravel(), z)[np.repeat(link, _PLACES), np.arange(near.size)]
-        best = sampled.reshape(near.shape).argmin(axis=1)
-        centre, least = near[rows, best], sampled.reshape(near.shape)[rows, best]
+        places = centre[:, None] + radius[:, None] * np.linspace(-1, 1, _PLACES)
+        rates = rates_at(body, friction, path, delta, places, guess=fine.velocity(places))
+        sampled = slowness(places.ravel(), rates.z.reshape(3, -1))[
+            np.repeat(link, _PLACES), np.arange(places.size)
+        ]
+        best = sampled.reshape(places.shape).argmin(axis=1)
+        centre, least = places[rows, best], sampled.reshape(places.shape)[rows, best]
         radius *= 2.0 / (_PLACES - 1)
     jumps = (np.abs(np.diff(velocity)).max(axis=0) > _SLOW * delta) & (np.diff(t) < _SEPARATE)
     kinks = np.sort(np.concatenate([centre[least < _SLOW * delta], 0.5 * (t[1:] + t[:-1])[jumps]]))
     kinks = kinks[(kinks > fine.edges[0] + _SEPARATE) & (kinks < fine.edges[-1] - _SEPARATE)]
     kinks = kinks[np.diff(kinks, prepend=-np.inf) > _SEPARATE]
-    found: list[float] = []
+    phases: list[float] = []
     for kink in kinks.tolist():
-        if not found or kink - found[-1] > apart:
-            found.append(kink)
-    return np.array(found)
+        if not phases or kink - phases[-1] > apart:
+            phases.append(kink)
+    return np.array(phases)
 
 
 def move_knots(edges: np.ndarray, kinks: np.ndarray, snap: float = _SNAP) -> np.ndarray:
@@ -407,25 +413,24 @@ def plan_mesh(
     delta: float,
     tolerance: float,
     *,
-    kept: np.ndarray | None = None,
+    knots: np.ndarray | tuple[()] = (),
     nested: bool = False,
     aim: float = AIM,
     most_points: int = MOST_POINTS,
 ) -> MeshPlan | None:
     """A mesh for a gait that was found on `mesh`, or None if that is good already.
 
-    The planned error is `aim` times the tolerance; the phases `kept` have to be knots; `nested`:
-    all knots of the mesh stay, so that a flat optimum has nowhere to come back to.
-    `NotConvergedError` without a balance.
+    The planned error is `aim` times the tolerance; `knots` stay, `nested` all of the mesh, so that
+    a flat optimum has nowhere to come back to. `NotConvergedError` without a balance.
     """
     fine = gait_motion(control, gait, delta, mesh, FINER * tolerance)
-    known = Known(control, gait, delta, fine)
+    reference = Reference(control, gait, delta, fine)
     error = mesh_error(control, mesh, gait, delta, tolerance, fine)
     accurate = error.estimate <= _GOOD * tolerance and error.turning <= TURNING
     if accurate and error.violation.max() <= VIOLATION:
         return None
     middles = 0.5 * (mesh.edges[1:] + mesh.edges[:-1])
-    knots = np.union1d(middles[error.violation > VIOLATION], [] if kept is None else kept)
+    knots = np.union1d(middles[error.violation > VIOLATION], knots)
     if accurate:
         edges = np.union1d(mesh.edges, knots)
         return MeshPlan(mesh.scheme.name, edges, error.estimate, True, knots)
@@ -436,10 +441,9 @@ def plan_mesh(
     best: MeshPlan | None = None
 
     def try_rule(rule, refine, *start):
-        """Take what a rule leads to if it is the first, or reaches the request by fewer points."""
         nonlocal best
         budget = most_points if best is None else min(most_points, best.points / _HANDICAP)
-        edges, estimate = refine(known, rule, *start, wanted=aim * tolerance, budget=budget)
+        edges, estimate = refine(reference, rule, *start, tolerance=aim * tolerance, budget=budget)
         plan = MeshPlan(rule.name, edges, estimate, estimate <= tolerance, knots)
         fewer = best is None or not best.reached or plan.points * _HANDICAP < best.points
         if best is None or (plan.reached and fewer):
@@ -472,30 +476,30 @@ def plan_mesh(
     return best
 
 
-def _by_error(shares: np.ndarray, wanted: float) -> tuple[np.ndarray, int]:
+def _by_error(shares: np.ndarray, tolerance: float) -> tuple[np.ndarray, int]:
     """Intervals by falling error, and how many of them hold most of the excess."""
     order = np.argsort(shares)[::-1]
-    return order, int((np.cumsum(shares[order]) < shares.sum() - 0.3 * wanted).sum())
+    return order, int((np.cumsum(shares[order]) < shares.sum() - 0.3 * tolerance).sum())
 
 
 def _split(
-    known: Known,
+    reference: Reference,
     rule: Scheme,
     edges: np.ndarray,
     kinks: np.ndarray,
     *,
-    wanted: float,
+    tolerance: float,
     budget: float,
 ) -> tuple[np.ndarray, float]:
     """Cut the intervals with the largest errors, in the middle or near an end that is a kink; the
     edges and the error that is left."""
     left, right = edges[:-1], edges[1:]
-    shares = interval_shares(known, rule, left, right)
-    unresolved = float(known.fine.unresolved.sum())
-    wanted = max(wanted - unresolved, 0.25 * wanted)
-    while shares.sum() > wanted and left.size * (rule.s - rule.left) < budget:
+    shares = interval_shares(reference, rule, left, right)
+    unresolved = float(reference.fine.unresolved.sum())
+    tolerance = max(tolerance - unresolved, 0.25 * tolerance)
+    while shares.sum() > tolerance and left.size * (rule.s - rule.left) < budget:
         # half of those that hold the excess at a time: what they leave behind is not known yet
-        order, count = _by_error(shares, wanted)
+        order, count = _by_error(shares, tolerance)
         chosen = order[: max(1, count // 2)]
         chosen = chosen[right[chosen] - left[chosen] > 2 * _NARROWEST]
         if chosen.size == 0:
@@ -504,7 +508,7 @@ def _split(
         at_a, at_b = np.isin(a, kinks), np.isin(b, kinks)
         middle = a + np.where(at_a & ~at_b, GRADE, np.where(at_b & ~at_a, 1 - GRADE, 0.5)) * (b - a)
         new_left, new_right = np.concatenate([a, middle]), np.concatenate([middle, b])
-        new = interval_shares(known, rule, new_left, new_right)
+        new = interval_shares(reference, rule, new_left, new_right)
         left, right, shares = (
             np.concatenate([np.delete(old, chosen), added])
             for old, added in ((left, new_left), (right, new_right), (shares, new))
@@ -513,16 +517,16 @@ def _split(
 
 
 def _halve(
-    known: Known, rule: Scheme, edges: np.ndarray, *, wanted: float, budget: float
+    reference: Reference, rule: Scheme, edges: np.ndarray, *, tolerance: float, budget: float
 ) -> tuple[np.ndarray, float]:
-    control, gait, delta, fine = known
+    control, gait, delta, fine = reference
     while True:
         error = mesh_error(control, Mesh(rule, edges), gait, delta, fine=fine)
         shares = np.abs(error.value)
-        small, full = shares.sum() <= wanted, edges.size * rule.s > budget
+        small, full = shares.sum() <= tolerance, edges.size * rule.s > budget
         if small or full or np.isnan(shares).any():
             return edges, error.estimate
-        order, count = _by_error(shares, wanted)
+        order, count = _by_error(shares, tolerance)
         chosen = order[: max(1, count)]
         chosen = chosen[shares[chosen] > _WORST * shares.max()]
         edges = np.sort(np.concatenate([edges, 0.5 * (edges[chosen] + edges[chosen + 1])]))

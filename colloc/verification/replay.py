@@ -27,7 +27,7 @@ from colloc.mechanics.densities import LENGTH, Instants, Limits, Quantity, limit
 from colloc.mechanics.law import Law
 from colloc.mechanics.solution_branches import FORWARDS, followed_motion
 from colloc.smooth.smooth_body import accurate_motion
-from colloc.system.arguments import check_finite
+from colloc.system.arguments import check_count, check_finite
 from colloc.system.errors import ProblemError
 from colloc.verification.adaptive_motion import Path, Replay, lever, poses, whole_totals
 from colloc.verification.differential_motion import ONE_SIDED, GaitOnSlope, GaitWithInertia
@@ -143,15 +143,15 @@ def _find_differences(panels: Panels) -> None:
     first, last = (np.searchsorted(left, end % 1.0, side="right") - 1 for end in ends)
     within = total[last + 1] - total[first] + total[-1] * (last < first)
     some = np.flatnonzero(within)
-    rates, (index, seen) = np.moveaxis(panels.rates, -1, 0), _beside(panels, some)
+    rates, (index, visible) = np.moveaxis(panels.rates, -1, 0), _beside(panels, some)
     more = rates[:, :, :4].reshape(len(rates), -1)[:, index]
     extended = np.concatenate([more[..., :_BESIDE], rates[:, some], more[..., _BESIDE:]], axis=2)
-    known = np.insert(seen, [_BESIDE] * 5, True, axis=1)
+    mask = np.insert(visible, [_BESIDE] * 5, True, axis=1)
     offsets = range(2 * _BESIDE + 1)
     windows = np.stack([extended[..., k : k + 5] for k in offsets], axis=1)
     whole = _integrals(WHOLE, width[some], windows)
     once = _integrals(HALF, width[some], windows[..., ::2])
-    there = np.stack([known[:, k : k + 5].all(axis=1) for k in offsets])
+    there = np.stack([mask[:, k : k + 5].all(axis=1) for k in offsets])
     each = [(a - b) * there for a, b in zip(whole, once, strict=True)]
     panels.differences[some] = np.transpose(each, (2, 1, 0))
 
@@ -168,12 +168,12 @@ def _beside(panels: Panels, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     if not corners[-1]:
         stretch[stretch == stretch[-1]] = 0
     left, width, at = left[chosen], width[chosen], stretch[chosen, None]
-    wanted = left + 0.25 * width * np.array([*range(-_BESIDE, 0), *range(5, 5 + _BESIDE)])
+    places = left + 0.25 * width * np.array([*range(-_BESIDE, 0), *range(5, 5 + _BESIDE)])
     slack = _SLACK * width
-    index = np.searchsorted(instants, wanted % 1.0 - slack) % instants.size
-    off = np.abs(instants[index] - wanted % 1.0)
-    seen = (np.minimum(off, 1 - off) < slack) & (stretch[index // 4] == at)
-    return index, seen & ~(corners[-1] & ((wanted < -slack) | (wanted > 1 - slack)))
+    index = np.searchsorted(instants, places % 1.0 - slack) % instants.size
+    off = np.abs(instants[index] - places % 1.0)
+    visible = (np.minimum(off, 1 - off) < slack) & (stretch[index // 4] == at)
+    return index, visible & ~(corners[-1] & ((places < -slack) | (places > 1 - slack)))
 
 
 def remaining_error(near: np.ndarray, far: np.ndarray, wider: np.ndarray) -> np.ndarray:
@@ -194,7 +194,7 @@ def replay(
     tolerance: float = 1e-6,
     most_instants: int = 100_000,
     breaks: np.ndarray | tuple[float, ...] = (),
-    near: Replay | None = None,
+    guess: Replay | None = None,
     sense: int = FORWARDS,
     objective: Objective = EFFICIENCY,
     quantities: Iterable[Quantity | str] = (),
@@ -222,7 +222,7 @@ def replay(
         No panel is halved once there are so many.
     breaks : (n,), optional
         Phases in (0, 1) where the rates jump (corners); they are integrated up to and from there.
-    near : Replay, optional
+    guess : Replay, optional
         Of the same path or one like it: where the motion is unique, solves start from its
         velocities, which saves time and changes nothing else.
     sense : {FORWARDS, BACKWARDS}
@@ -265,28 +265,24 @@ def replay(
     begin, end = path(np.array([0.0, 1.0]))[0].T
     if not np.allclose(begin, end, rtol=0, atol=_CORNER):
         raise ProblemError("the path is no cycle: it must end at the angles where it begins.")
-    asked = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
+    integrands = tuple(dict.fromkeys([LENGTH, *objective.integrals, *quantities_of(quantities)]))
     joint_map = getattr(path, "joint_map", None)
     limits = limits_of(limits, joint_map.n_motor if joint_map else body.n_joint)
     regime = replace(regime, froude=froude, free=None) if froude else regime.at(path)
     if not regime.slow_on_level:
-        of, paths = (body, friction, path, delta), whole_totals(asked, path)
-        how: Any = {"breaks": breaks, "quantities": asked}
+        of, paths = (body, friction, path, delta), whole_totals(integrands, path)
+        how: Any = {"breaks": breaks, "quantities": integrands}
         if not regime.froude:
             on = GaitOnSlope(*of, regime, **how)
             return on.replay(objective, tolerance, paths, limits, instants)
         moving = GaitWithInertia(*of, froude=regime.froude, turn=turn, regime=regime, **how)
-        return moving.replay(objective, tolerance, paths, limits, near)
+        return moving.replay(objective, tolerance, paths, limits, guess)
     if "period" in objective.uses:
         raise ProblemError(
             f"the objective {objective.name!r} uses the period: give the froude at which it "
             f"is played."
         )
-    if not 4 <= instants <= MOST_INSTANTS or instants % 2:
-        raise ProblemError(
-            f"instants must be an even number of at least 4, and at most {MOST_INSTANTS}, not "
-            f"{instants!r}."
-        )
+    check_count(MOST_INSTANTS, least=4, instants=instants)
     law = body.law(friction) if isinstance(body, Chain) else friction
     residual, shares = 0.0, np.full(len(limits.names), -np.inf)
 
@@ -296,10 +292,10 @@ def replay(
         nonlocal residual, shares
         angles, rates = path(t.ravel())
         at = body, law, angles, rates, delta
-        now, apart = Instants(*at, joint_map=joint_map), np.zeros((3 + len(asked), t.size))
+        now, apart = Instants(*at, joint_map=joint_map), np.zeros((3 + len(integrands), t.size))
         if not law.associated and isinstance(body, Chain):
             before = None if whole else start
-            start, apart = followed_motion(now, asked, before=before, sense=sense)
+            start, apart = followed_motion(now, integrands, before=before, sense=sense)
             start = np.nan_to_num(start)
         motion, left_over = accurate_motion(*at, start)
         now = replace(now, z=motion.z)
@@ -307,23 +303,17 @@ def replay(
         if limits.names:
             shares = np.maximum(shares, limits.sizes(limits.at(now)).max(axis=1))
         centre = motion.centre[0] + 1j * motion.centre[1]
-        densities = [quantity.at(now) for quantity in asked]
+        densities = [quantity.at(now) for quantity in integrands]
         rows = np.vstack([motion.z[2] - turn, centre, motion.power, *densities])
-        found = motion.z, rows, motion.actuator_power, apart
-        return tuple(each.T.reshape(*t.shape, *each.shape[:-1]) for each in found)
+        results = motion.z, rows, motion.actuator_power, apart
+        return tuple(each.T.reshape(*t.shape, *each.shape[:-1]) for each in results)
 
-    # equal panels between any two corners, where rates are one-sided
-    pieces = [(a, b, 2 * max(1, round(instants * (b - a) / 8))) for a, b in pairwise(ends)]
-    edges = np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), 1.0)
-    t = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, 5)
-    t[:, 4] = edges[1:]
-    t[np.isin(edges[:-1], breaks), 0] += ONE_SIDED
-    t[np.isin(edges[1:], breaks), 4] -= ONE_SIDED
+    edges, t = _first_grid(ends, instants)
     once, place = np.unique(t, return_inverse=True)  # neighbours share an instant
-    state = state_at(once, None if near is None else near.tail_velocity(once), whole=True)
+    state = state_at(once, None if guess is None else guess.tail_velocity(once), whole=True)
     values_there = tuple(each[place.reshape(t.shape)] for each in state)
     panels = first_panels(edges[:-1], np.diff(edges), values_there)
-    names = "rotation", "distance", "work", *(each.name for each in asked)
+    names = "rotation", "distance", "work", *(each.name for each in integrands)
     chord = chord_per_way(turn)
     while True:
         spin, move, *sums = increments(panels)
@@ -339,17 +329,11 @@ def replay(
         changed, one_beside, two_beside = changes(panels, heading, place)
         missed = remaining_error(one_beside, two_beside, panels.wider).T
         missed[1] *= chord
-        lost = dict(zip(names, missed, strict=True))
-        gap = objective.relative_error(values, lost)
-        order = np.argsort(gap)
+        errors = dict(zip(names, missed, strict=True))
+        gap = objective.relative_error(values, errors)
         # finer panels do not make up for what the balance leaves over
-        excess = (np.cumsum(gap[order]) + residual > tolerance) & (residual < tolerance)
-        excess &= panels.width[order] > _NARROWEST
-        # and neighbours that are not narrower: halves are judged with instants beside them
-        narrow = np.full(order.size, np.inf)
-        narrow[order[excess]] = panels.width[order[excess]]
-        beside = np.minimum(np.roll(narrow, 1), np.roll(narrow, -1))
-        chosen = np.flatnonzero((panels.width >= beside) | np.isfinite(narrow))
+        left_over = tolerance - residual if residual < tolerance else np.inf
+        chosen = _largest(gap, panels.width, left_over)
         if chosen.size == 0 or 4 * (panels.left.size + chosen.size) > most_instants:
             break
         old = panels.take(chosen)
@@ -359,22 +343,17 @@ def replay(
         else:  # the branch on which the body is before
             start = old.z[:, :-1] if sense == FORWARDS else old.z[:, 1:]
         halves = old.halves(state_at(middles, start.reshape(-1, 3).T), changed[chosen])
-        panels = panels.take(np.delete(np.arange(order.size), chosen)).join(halves)
-    # of two neighbouring instants the one at which others lead farther counts between them; a
-    # rotation moves all of the way
-    worse = np.maximum(panels.apart[:, :-1], panels.apart[:, 1:])
-    off = np.einsum("n,nki->i", 0.25 * panels.width, worse)
-    others = [off[1], off[0] + np.abs(place - place[-1]).max() * off[1], *off[2:]]
-    several = float(0.25 * panels.width @ worse.any(axis=2).sum(axis=1))
+        panels = panels.take(np.delete(np.arange(gap.size), chosen)).join(halves)
+    others, several = _other_motions(panels, place)
     known = panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)
     known[np.isin(panels.left, breaks), 0] += ONE_SIDED
     # what the balance leaves over counts in proportion to each
-    sizes = {each.name: each.needs_forces * abs(values[each.name]) for each in asked}
+    sizes = {each.name: each.needs_forces * abs(values[each.name]) for each in integrands}
     sizes = values | {"rotation": 1.0} | sizes
     return Replay(
         values=values,
-        errors={name: float(lost[name].sum() + residual * sizes[name]) for name in names},
-        others=dict(zip(names, map(float, others), strict=True)),
+        errors={name: float(errors[name].sum() + residual * sizes[name]) for name in names},
+        others=dict(zip(names, others, strict=True)),
         lever=lever(body, path(known.ravel())[0]),
         actuator_work=float(((panels.joint_power @ WHOLE[-1]) * panels.width).sum()),
         residual=residual,
@@ -385,6 +364,39 @@ def replay(
         shares=shares,
         objective=objective,
     )
+
+
+def _first_grid(ends: np.ndarray, instants: int) -> tuple[np.ndarray, np.ndarray]:
+    """Edges of equal panels between corners, and instants ``(n, 5)``, one-sided there."""
+    pieces = [(a, b, 2 * max(1, round(instants * (b - a) / 8))) for a, b in pairwise(ends)]
+    edges = np.append(np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in pieces]), 1.0)
+    t = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, 5)
+    t[:, 4] = edges[1:]
+    t[np.isin(edges[:-1], ends[1:-1]), 0] += ONE_SIDED
+    t[np.isin(edges[1:], ends[1:-1]), 4] -= ONE_SIDED
+    return edges, t
+
+
+def _largest(gap: np.ndarray, width: np.ndarray, tolerance: float) -> np.ndarray:
+    """Panels of the largest errors, without which their sum is below the tolerance; and neighbours
+    that are not narrower, as halves are judged with instants beside them."""
+    order = np.argsort(gap)
+    excess = (np.cumsum(gap[order]) > tolerance) & (width[order] > _NARROWEST)
+    narrow = np.full(order.size, np.inf)
+    narrow[order[excess]] = width[order[excess]]
+    beside = np.minimum(np.roll(narrow, 1), np.roll(narrow, -1))
+    return np.flatnonzero((width >= beside) | np.isfinite(narrow))
+
+
+def _other_motions(panels: Panels, place: np.ndarray) -> tuple[list[float], float]:
+    """How far others would lead, and the part of the time at which there are some. Of two
+    neighbouring instants that counts at which they lead farther; a rotation moves all of the
+    way."""
+    worse = np.maximum(panels.apart[:, :-1], panels.apart[:, 1:])
+    off = np.einsum("n,nki->i", 0.25 * panels.width, worse)
+    off[0] += np.abs(place - place[-1]).max() * off[1]
+    several = float(0.25 * panels.width @ worse.any(axis=2).sum(axis=1))
+    return [off[1].item(), off[0].item(), *off[2:].tolist()], several
 
 
 def replayer(regime: Regime) -> Callable[..., Replay]:

@@ -58,14 +58,14 @@ def plan_trajectory(
         raise ProblemError("a trajectory needs a period in seconds or joint speed limits.")
     slowest = _slowest(vertices, most, keep_pace)
     shortest = float(slowest.mean())
-    wanted = shortest if period is None else period
-    if wanted < shortest * (1 - 1e-9):
-        kept = " at the gait's own pace, which matters here" if keep_pace else ""
+    cycle = shortest if period is None else period
+    if cycle < shortest * (1 - 1e-9):
+        pace = " at the gait's own pace, which matters here" if keep_pace else ""
         raise ProblemError(
-            f"a cycle of {wanted:g} s is too short for the joint speed limits{kept}; use at least "
+            f"a cycle of {cycle:g} s is too short for the joint speed limits{pace}; use at least "
             f"{shortest:.6g} s."
         )
-    count = int(np.ceil(wanted * rate * (1 - 1e-6)))  # one at its bound is longer
+    count = int(np.ceil(cycle * rate * (1 - 1e-6)))  # one at its bound is longer
     if not 4 <= count <= MOST_SAMPLES:
         raise ProblemError(
             f"{count:g} samples per cycle are too {'few' if count < 4 else 'many'}; change the "
@@ -140,5 +140,5 @@ def _slowest(vertices: np.ndarray, limits: np.ndarray, keep_pace: bool) -> np.nd
 
 def one_each(limits: np.ndarray | Sequence[float] | float, n_joint: int, what: str) -> np.ndarray:
     """Positive limits ``(n_joint,)`` from one for all or one each."""
-    stated = np.ravel(limits)[0] if np.size(limits) == 1 else limits
-    return np.array(of_each(checked_actuator_limit(what, stated, n_joint), n_joint))
+    limit = np.ravel(limits)[0] if np.size(limits) == 1 else limits
+    return np.array(of_each(checked_actuator_limit(what, limit, n_joint), n_joint))

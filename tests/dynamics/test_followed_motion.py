@@ -78,7 +78,7 @@ def test_the_replay_follows_the_branch_in_time_and_against_it_as_if_the_gait_wer
     back = replay(BODY, STEEP, reverse, 1e-4)
     assert (other.work, other.distance) == pytest.approx((back.work, back.distance), rel=1e-6)
     # a motion to start from does not decide the branch
-    assert replay(*at, near=other).efficiency == pytest.approx(followed.efficiency, rel=1e-9)
+    assert replay(*at, guess=other).efficiency == pytest.approx(followed.efficiency, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", [3, 23])

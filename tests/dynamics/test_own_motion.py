@@ -26,10 +26,10 @@ class PushedMotion(QuasiStatic):
 
     followed = True
 
-    def simulate(self, mesh, shapes, static, near_states=None, near_z=None):
+    def simulate(self, mesh, shapes, static, states_guess=None, z_guess=None):
         at = self.body, self.law, shapes.angles, shapes.rates, shapes.delta
         pushed = self.regime.pull(np.zeros((1, mesh.n_point)))
-        solved = solve_balance(*at, load=pushed, start=near_z, tolerance=1e-12)
+        solved = solve_balance(*at, load=pushed, start=z_guess, tolerance=1e-12)
         now = chain_motion(*at, solved, pushed)
 
         def slopes():

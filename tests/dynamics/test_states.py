@@ -59,8 +59,8 @@ def test_they_converge_to_the_differential_equation_with_the_order_of_the_scheme
     for n in (10, 20):
         mesh = Mesh(scheme("gauss-2"), np.linspace(0.0, 1.0, n + 1))
         equations = CollocatedStates(mesh, np.full(k, free))
-        states, found, held = equations.solve(on_mesh(mesh, ode), 0 * start if free else start)
-        assert held
+        states, found, exist = equations.solve(on_mesh(mesh, ode), 0 * start if free else start)
+        assert exist
         end = found + equations.integrals(ode[0](mesh.times, states))[1][:, -1]
         errors.append(np.abs(end - exact).max())
         if free:
@@ -75,10 +75,10 @@ def test_half_a_period_and_its_image_are_the_whole():
         Mesh(scheme("gauss-4"), np.linspace(0.0, end, n + 1)) for end, n in ((0.5, 20), (1.0, 40))
     )
     equations = CollocatedStates(half, np.full(2, True), image)
-    first, start, held = equations.solve(on_mesh(half, ode), np.zeros(2))
+    first, start, exist = equations.solve(on_mesh(half, ode), np.zeros(2))
     equations = CollocatedStates(whole, np.full(2, True))
     both, again, _ = equations.solve(on_mesh(whole, ode), np.zeros(2))
-    assert held
+    assert exist
     np.testing.assert_allclose(start, again, atol=1e-11)
     np.testing.assert_allclose(np.concatenate([first, -first], axis=1), both, atol=1e-11)
 
@@ -88,8 +88,8 @@ def test_a_periodic_motion_is_found_where_others_grow_beyond_all_numbers():
     mesh = Mesh(scheme("gauss-2"), np.linspace(0.0, 1.0, 301))
     growth, equations = 3.46 * mesh.n, CollocatedStates(mesh, free=np.ones(1, dtype=bool))
     slope = np.full((1, 1, mesh.n_point), growth)
-    states, _, held = equations.solve(lambda s: Rates(growth * s + 1.0, slope), np.zeros(1))
-    assert held
+    states, _, exist = equations.solve(lambda s: Rates(growth * s + 1.0, slope), np.zeros(1))
+    assert exist
     np.testing.assert_allclose(states, -1.0 / growth, rtol=0, atol=1e-12)
 
 
@@ -107,7 +107,7 @@ def test_a_slow_motion_down_a_steep_slope_is_found_where_steps_run_out_of_what_b
     shapes = Shapes(*Fourier([-0.9, -1.1], cos, sin)(mesh.times), 0.03)
     slow = OnSlope(body, body.law(Friction(mu_t=8.0)), Regime(grade=0.6))
     along = slow.simulate(mesh, shapes, np.array([3.0]))
-    assert along.held.all()
+    assert along.exist.all()
     turned = slow.equations(mesh).integrals(along.now.z[2:])[0]
     np.testing.assert_allclose(along.states, 3.0 + turned, atol=1e-9)
 

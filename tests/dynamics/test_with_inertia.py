@@ -156,8 +156,8 @@ def test_on_feet_that_hold_the_motion_is_found_soon_from_far_away(seed, monkeypa
     compiled = kind.simulate(*at, far)
     with numpy_instead():
         found = kind.simulate(*at, far)
-    assert found.held.all()
-    assert compiled.held.all()
+    assert found.exist.all()
+    assert compiled.exist.all()
     np.testing.assert_allclose(compiled.states, found.states, atol=1e-11)
     np.testing.assert_allclose(found.states, expected.states, atol=1e-9)
     assert len(asked) < 300

@@ -153,7 +153,7 @@ def test_a_path_on_file_is_replayed_at_delta_at_unit_shape_speed_and_for_its_tur
     at = {"rotation": 0.3, "delta": 4e-4, "mesh_tolerance": 1e-2, "gait": colloc.Polygon(4)}
     polygon = colloc.solve(colloc.Problem("p", colloc.ellipse(0, 0.8, 0.6), **at), 1)
     found = sensitivity(polygon, resolve=True, change=1e-3)["friction sideways"].again
-    assert [each.kept for each in found] == pytest.approx([each.value for each in found], rel=1e-4)
+    assert [a.on_file for a in found] == pytest.approx([a.value for a in found], rel=1e-4)
     assert not any(each.breaks for each in found)
     monkeypatch.setattr("colloc.search.sensitivity.finish", lambda *at: polygon)
     less = _again(polygon, polygon.problem.with_(rotation=0.28), 0.1)
@@ -167,10 +167,10 @@ def test_a_gait_that_exceeds_a_limit_or_turns_says_so(three_link, of):
     assert "beyond its limits" in less.breaks
     assert less.value < three_link.value
     first = slopes.value - 0.1 * slopes["joint limit"].slope
-    numbers = [f"{x:.4f}" for x in (first, less.value, less.kept)]
+    numbers = [f"{x:.4f}" for x in (first, less.value, less.on_file)]
     assert str(slopes).split()[-11:-4] == ["limit", "-10", "%", *numbers, f"{less.behind:.1e}"]
     (told,) = slopes.facts()["effects"][0]["again"]
-    assert (told["kept"], told["behind"]) == (less.kept, less.value - less.kept)
+    assert (told["on_file"], told["behind"]) == (less.on_file, less.value - less.on_file)
 
 
 @pytest.mark.parametrize(("part", "says"), [(1.05, "distance 0.2679, not 0.2813"), (0.95, "")])
@@ -183,7 +183,7 @@ def test_a_gait_on_file_that_goes_less_far_than_is_asked_says_so(
     again, at = _again(three_link, asked, 0.1), (asked.body, asked.law, three_link.gait)
     assert again.breaks == says
     kept = colloc.replay(*at, asked.delta)
-    assert again.kept_error == pytest.approx(kept.error * kept.value, rel=0.1)
+    assert again.on_file_error == pytest.approx(kept.error * kept.value, rel=0.1)
 
 
 def test_feet_that_have_to_be_alike_move_together():
@@ -267,6 +267,6 @@ def test_what_is_no_optimum_is_refused(three_link, tmp_path):
 def test_the_error_of_a_slope_is_the_most_it_differs_by_on_another_mesh(three_link, monkeypatch):
     """Meshes on which a problem is worth so many times its friction sideways."""
     on = [lambda problem, n=n: n * problem.friction.mu_t for n in (3.0, 2.6, 3.1)]
-    monkeypatch.setattr("colloc.search.sensitivity._on_meshes", lambda answer: on)
+    monkeypatch.setattr("colloc.search.sensitivity._lagrangians", lambda answer: on)
     found = three_link.sensitivity()["friction sideways"]
     assert (found.slope, found.error) == pytest.approx((3.0, 0.4), rel=1e-6)

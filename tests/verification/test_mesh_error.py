@@ -85,7 +85,7 @@ def test_total_error_is_that_of_collocation_and_the_estimate_bounds_it(name, fri
     for k in range(mesh.n):
         stage = theta + mesh.h[k] * mesh.scheme.A @ rates.z[2, k]
         x += mesh.h[k] * mesh.scheme.b @ (np.exp(1j * stage) * rates.centre[k])
-        work += mesh.h[k] * mesh.scheme.b @ rates.gained[0, k]
+        work += mesh.h[k] * mesh.scheme.b @ rates.densities[0, k]
         theta += mesh.h[k] * mesh.scheme.b @ rates.z[2, k]
     true = abs(x) / work / replayed(friction).efficiency - 1
     assert error.total == pytest.approx(true, rel=2e-3, abs=3e-8)
@@ -215,7 +215,7 @@ def test_a_nested_mesh_has_every_knot_of_the_one_before():
     stated = problem("gauss-3")
     edges = control_problem(stated).mesh().edges
     plan, free = (
-        planned(stated, nested=nested, kept=np.array([0.123])) for nested in (True, False)
+        planned(stated, nested=nested, knots=np.array([0.123])) for nested in (True, False)
     )
     assert np.isin(edges, plan.edges).all()
     assert not np.isin(edges, free.edges).all()
