@@ -54,8 +54,8 @@ class CoulombMotion(NamedTuple):
     def size(self) -> int:
         return self.spin.size
 
-    def take(self, chosen: np.ndarray | np.intp) -> CoulombMotion:
-        return CoulombMotion(*(each[..., chosen] for each in self))
+    def take(self, index: np.ndarray | np.intp) -> CoulombMotion:
+        return CoulombMotion(*(each[..., index] for each in self))
 
     def join(self, *others: CoulombMotion) -> CoulombMotion:
         rows = zip(self, *others, strict=True)

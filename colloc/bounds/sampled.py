@@ -255,15 +255,15 @@ class Samples:
         gain, heading = largest_gain(self.amplitudes(free))
         return gain / self.motion.power, heading
 
-    def rows(self, chosen: np.ndarray, heading: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:
+    def rows(self, index: np.ndarray, heading: np.ndarray) -> tuple[sparse.csr_matrix, np.ndarray]:
         """Gain over power of chosen samples at headings: ``matrix @ free + constant``."""
-        motion = self.motion.take(chosen)
-        (u, v), value, slope = motion.velocity, self.value[chosen], self.slope[chosen]
+        motion = self.motion.take(index)
+        (u, v), value, slope = motion.velocity, self.value[index], self.slope[index]
         constant, blocks = (np.cos(heading) * u - np.sin(heading) * v) / motion.power, []
         for k, basis, _ in self.space.layout:
             wave = np.exp(1j * k * heading) / motion.power
-            turned = sparse.diags(1j * k * motion.spin * wave) @ value
-            blocks.append(((sparse.diags(wave) @ slope + turned) @ basis).real)
+            turns = sparse.diags(1j * k * motion.spin * wave) @ value
+            blocks.append(((sparse.diags(wave) @ slope + turns) @ basis).real)
         return sparse.hstack(blocks, format="csr"), constant
 
 
@@ -429,7 +429,6 @@ class _Program:
         self.best = smallest_maximum(self.rows, self.constants, self.penalty)
 
     def settle(self, excess: float) -> None:
-        """Exchange until no sample exceeds the value by more."""
         for _ in range(_INNER_ROUNDS):
             ratio, heading = self.samples.ratio(self.best.x)
             if ratio.max() <= self.best.value + excess:

@@ -35,7 +35,7 @@ from colloc.system.progress import StatusLine
 if TYPE_CHECKING:
     from colloc.gaits.problem import Problem
     from colloc.gaits.problem_file import ProblemFile
-    from colloc.results.store import Saved
+    from colloc.results.store import SavedFile
 
 SUBCOMMANDS = {
     "init": ("solve", "write a commented problem file for a chain of links, to change and solve"),
@@ -308,10 +308,12 @@ def complain(sentence: str) -> None:
 
 
 def tell(
-    options: argparse.Namespace, facts: dict, lines: Sequence[str], saved: list[Saved] | None = None
+    options: argparse.Namespace,
+    facts: dict,
+    lines: Sequence[str],
+    saved: list[SavedFile] | None = None,
 ) -> None:
-    """Print the result of a command, and what became of former results: facts as one JSON object,
-    or lines for people."""
+    """Print a result and what became of former ones: as JSON, or lines for people."""
     former = [one for one in saved or () if one.former is not None]
     if saved is not None:
         facts = facts | {"kept": [str(one.former) for one in former]}

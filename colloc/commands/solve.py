@@ -24,7 +24,7 @@ from colloc.mechanics.chain import Chain
 from colloc.pictures import render
 from colloc.results.robot import in_si, limit_lines, limit_shares
 from colloc.results.solution import CERTIFICATE_FAILED, INTERRUPTED, NOT_CONVERGED, SOLVED, Solution
-from colloc.results.store import Saved, save_result
+from colloc.results.store import SavedFile, save_result
 from colloc.system.errors import CollocError, NotConvergedError, ProblemError
 from colloc.system.files import write_text
 from colloc.system.progress import duration
@@ -300,7 +300,7 @@ def solve(options: argparse.Namespace) -> int:
             progress=lambda news: line.say(f"{problem.name}: {news}"),
             **cli.values(options, "seconds", "search", "fresh"),
         )
-    bound, saved, records, ended = None, list[str](), list[Saved](), not solution.interrupted
+    bound, saved, records, ended = None, list[str](), list[SavedFile](), not solution.interrupted
     if options.dry and solution.certificate.replayed:
         with complaining("no bounds under dry friction"):
             solution.certify_dry()
@@ -389,7 +389,7 @@ def identify(options: argparse.Namespace) -> int:
     return cli.OK
 
 
-FamilyResult = tuple[Any, dict[str, Any], list[str], list[Saved]]
+FamilyResult = tuple[Any, dict[str, Any], list[str], list[SavedFile]]
 """A family, facts about it, lines for people, and what is saved."""
 
 
@@ -407,7 +407,7 @@ def find_family(
     """
     from colloc.studies.solve import checkpoints_in
 
-    members, saved, name = dict[Path, Solution](), list[Saved](), file.problem.name
+    members, saved, name = dict[Path, Solution](), list[SavedFile](), file.problem.name
     with checkpoints_in(table.with_suffix("")):
         with cli.status_line(options) as line:
 

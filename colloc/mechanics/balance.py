@@ -52,9 +52,9 @@ class Moving(NamedTuple):
     delta: float
     load: np.ndarray | None = None
 
-    def at(self, chosen: np.ndarray) -> Moving:
-        load = None if self.load is None else self.load[:, chosen]
-        return self._replace(angles=self.angles[:, chosen], rates=self.rates[:, chosen], load=load)
+    def at(self, index: np.ndarray) -> Moving:
+        load = None if self.load is None else self.load[:, index]
+        return self._replace(angles=self.angles[:, index], rates=self.rates[:, index], load=load)
 
     def at_rest(self, link: int) -> np.ndarray:
         at = self.body.posture(self.angles, link)

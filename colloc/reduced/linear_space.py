@@ -14,7 +14,7 @@ from colloc.mechanics.contact import Pairs
 from colloc.numerics.sqp import keep_last
 from colloc.reduced.motion import ReducedMotion
 from colloc.reduced.program import Constraints, SearchSpace
-from colloc.transcription.shape_constraints import Placed, near_peaks, shape_checks
+from colloc.transcription.shape_constraints import CheckTimes, near_peaks, shape_checks
 
 _TURNS = 0.25 * np.pi * np.array([0, 1, -1, 2, -2, 3, -3])
 """Turns [rad] of the initial heading tried where the body slides down."""
@@ -129,22 +129,22 @@ class LinearSpace(SearchSpace):
         which, cells, times = near_peaks(gaits, table, mesh, checks, self._limit, reach)
         times = times + later * mesh.h[cells]
         shapes = checks.shapes(gaits, table, which, times)
-        placed = Placed(checks, which, cells, times, checks.shares(which, shapes))
+        checks_at = CheckTimes(checks, which, cells, times, checks.shares(which, shapes))
         values = checks.values(which, shapes)
         lower, upper = (each[which] for each in checks.bounds(self._limit))
         above, below = values - upper, lower - values
         excess, is_below = np.maximum(above, below), below > above
         lower, upper = np.where(is_below, lower, -np.inf), np.where(is_below, np.inf, upper)
         lower = np.append(lower, self.control.admissible.smallest_shape_speed**2)
-        kinds = placed.cells_of | {"shape speed": np.zeros(1, dtype=int)}
-        moving = placed.moving(excess, mesh)
+        kinds = checks_at.cells_of | {"shape speed": np.zeros(1, dtype=int)}
+        moving = checks_at.moving(excess, mesh)
         rest = self._offset * (which < checks.n_shape)
         functions = checks.functions(gaits, which, times)
 
         @keep_last
         def at_worst(v):
             there = functions.copy()
-            worst = placed.follow(moving, gaits, self._table(v), mesh, self._limit)
+            worst = checks_at.follow(moving, gaits, self._table(v), mesh, self._limit)
             there[:, moving] = checks.functions(gaits, which[moving], worst)
             return there
 
@@ -153,11 +153,11 @@ class LinearSpace(SearchSpace):
                 return self._table(v) @ functions_at(v) + rest
 
             def values(v):
-                values = checks.values(which, shapes(v), placed.shares)
+                values = checks.values(which, shapes(v), checks_at.shares)
                 return np.append(values, self._square_of_speed(v)[0])
 
             def slopes(v):
-                on_shapes = checks.slopes(which, shapes(v), placed.shares)
+                on_shapes = checks.slopes(which, shapes(v), checks_at.shares)
                 slopes = gaits.pull_back(on_shapes, functions_at(v))
                 return self.shape_vjp(v, np.vstack([slopes, self._square_of_speed(v)[1]]))
 
@@ -168,7 +168,7 @@ class LinearSpace(SearchSpace):
             if not gaits.linear or self._n_static or (moving.size and type(gaits) is not Harmonic):
                 return None
             low, high = (each[which[moving]] for each in checks.bounds(self._limit))
-            at = {"which": which, "shares": placed.shares, "functions": functions.T}
+            at = {"which": which, "shares": checks_at.shares, "functions": functions.T}
             counts = {"n_shape_row": which.size, "n_moving": moving.size, "moving": moving}
             follow = {"left": mesh.edges[cells[moving]], "width": mesh.h[cells[moving]]}
             follow |= {"instants": times[moving], "watched_low": low, "watched_high": high}

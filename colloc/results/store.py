@@ -250,7 +250,7 @@ _HOW = {"guess", "intervals", "scheme", "formulation", "mesh_tolerance", "delta_
 
 
 @dataclass(frozen=True)
-class Saved:
+class SavedFile:
     """A saved result, and where and why the former one was kept."""
 
     path: Path
@@ -258,7 +258,7 @@ class Saved:
     why: str = ""
 
 
-def save_result(solution: Solution, path: Path) -> list[Saved]:
+def save_result(solution: Solution, path: Path) -> list[SavedFile]:
     """Save a solution at `path` (NAME.h5), or beside it if it failed (NAME.failed.h5) or was
     interrupted (NAME.interrupted.h5); then the better gait that shrank, if there is one, as
     NAME.shrunk.h5.
@@ -280,11 +280,11 @@ def save_result(solution: Solution, path: Path) -> list[Saved]:
     return saved
 
 
-def _save(solution: Solution, path: Path) -> Saved:
+def _save(solution: Solution, path: Path) -> SavedFile:
     there = _solution_at(path)
     why = _worth(there, solution, path)
     if not why:
-        return Saved(save(solution, path))
+        return SavedFile(save(solution, path))
     places = (beside(path, f"former-{k}") for k in itertools.count(1))
     # a free one, or one whose result the one that is there could replace
     place = next(
@@ -295,7 +295,7 @@ def _save(solution: Solution, path: Path) -> Saved:
     )
     with _set_aside(path, place):
         save(solution, path)
-    return Saved(path, place, why)
+    return SavedFile(path, place, why)
 
 
 def _solution_at(path: Path) -> Solution | None:

@@ -160,8 +160,8 @@ def _rows(
     if problem.rotation is not None:
         which = f"beyond {problem.rotation:g} rad" if problem.rotation else "over a cycle"
         meaning = f"{which}, times the body's reach over the distance"
-        turned = astray(fine, problem.rotation) / max(fine.distance, 1e-300)
-        yield "net rotation", turned, at.replay_gap, meaning
+        by_rotation = astray(fine, problem.rotation) / max(fine.distance, 1e-300)
+        yield "net rotation", by_rotation, at.replay_gap, meaning
     stretched, limit = under_one_limit(angles, problem.joint_limit)
     excess = max(float(body.bounded_angles.largest(stretched).max()) - limit, 0.0)
     yield usual.limit_name, excess, usual.excess, "excess between nodes [rad]"

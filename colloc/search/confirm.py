@@ -377,15 +377,15 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
         kkt_error=iterate.kkt_error,
         complementarity=iterate.complementarity,
     )
-    failed = replace(before, status=NOT_STATIONARY, iterations=iterate.step.iterations)
+    failure = replace(before, status=NOT_STATIONARY, iterations=iterate.step.iterations)
     if iterate.violation > OPTIONS.confirm_radius:  # no gait within reach is admissible
-        return program, failed, explanation(program, failed, delta)
+        return program, failure, explanation(program, failure, delta)
     if iterate.on_kink and feasible:
         kink = "The optimum is a kink of the objective: gradients on its sides cancel"
         return program, here, f"{kink} (to {here.kkt_error:.1e})."
     if iterate.strays and not before.optimal:
         # in 7 of 7 such ends of three random problems IPOPT did not confirm, for half of the time
-        return program, failed, f"not converged at delta = {delta:.1e}: {_STRAYS}"
+        return program, failure, f"not converged at delta = {delta:.1e}: {_STRAYS}"
     result = solver.solve_within(
         x, delta, (before.lam_x, before.lam_g), radius := OPTIONS.confirm_radius
     )
@@ -414,7 +414,7 @@ def _solve_full(iterate: Iterate) -> tuple[FullProgram, NlpResult, str]:
         where = f"KKT error {here.kkt_error:.1e}; {before.kkt_error:.1e} on the {kind} program"
         text = f"First-order conditions hold in the reduced space ({where}); {ended}."
         return program, here, text
-    return program, failed, f"{explanation(program, failed, delta)} {ended}."
+    return program, failure, f"{explanation(program, failure, delta)} {ended}."
 
 
 def _with_whole_turns(program: FullProgram, x: np.ndarray) -> FullProgram:

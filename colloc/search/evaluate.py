@@ -140,13 +140,13 @@ def evaluate(
             f"smallest_shape_speed {least:g}, where friction is viscous."
         )
     answer = on_fine_mesh(problem, driven)
-    turned = answer.rotation
-    if abs(turned) < TOLERANCES.replay_gap * answer.distance:
+    rotation = answer.rotation
+    if abs(rotation) < TOLERANCES.replay_gap * answer.distance:
         if not problem.uses("rotation"):  # which then may be anything
             problem = problem.with_(rotation=0.0)
             answer = replace(answer, problem=problem)
     else:  # how far it goes is then the chord of its arc
-        problem = problem.with_(rotation=turned)
+        problem = problem.with_(rotation=rotation)
         answer = on_fine_mesh(problem, driven)
     certificate, remark = UNCERTIFIED, ""
     if goes_nowhere(answer):
@@ -320,7 +320,7 @@ _PART = 0.3  # of the largest change, that is named
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class Identification:
     problem: Problem = field(repr=False)  # with this friction
     coefficients: dict[str, tuple[float, float]]
     """Values and errors, two standard deviations; these are infinite where the motion does not tell
@@ -363,7 +363,7 @@ def identify(
     period: float | None = None,
     harmonics: int | None = None,
     degrees: bool = False,
-) -> Identified:
+) -> Identification:
     """Identify coefficients of friction from measured joint angles and the way that a body went.
 
     Slow motion under dry friction tells ratios of coefficients alone: the forward one is taken as
@@ -477,7 +477,7 @@ def identify(
     message = f"{fitted.describe(used)}{at_pace}; path of {path_of} in body {unit}"
     both = zip(values.tolist(), errors.tolist(), strict=True)
     coefficients = dict(zip(fit.names, both, strict=True))
-    return Identified(fit.with_(x, 5), coefficients, before, after, tuple(remarks), message)
+    return Identification(fit.with_(x, 5), coefficients, before, after, tuple(remarks), message)
 
 
 def _measured(path: Path, record: Record, length: float | None) -> tuple[np.ndarray, list[Column]]:
@@ -619,8 +619,8 @@ class _Fit:
             table = self.gait.resize(most).table
             others = [Fourier.from_table(table + each) for each in samples.directions]
             others += [samples.richer] if samples.richer is not None else []
-            moved = np.array([self.rows(x, each) - here for each in others])
-            effects = covariance @ slopes.T @ moved.T
+            change = np.array([self.rows(x, each) - here for each in others])
+            effects = covariance @ slopes.T @ change.T
             covariance += effects @ effects.T
         return alike, covariance
 

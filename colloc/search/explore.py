@@ -52,7 +52,7 @@ from colloc.search.iterate import Iterate, evaluate_at, space_near, space_of
 from colloc.search.optimise import (
     delta_levels,
     descend,
-    halved,
+    halve,
     optimise,
     project_to_zero_rotation,
     regularisation_dominated,
@@ -492,7 +492,7 @@ def _follow_promising(problem: Problem, candidates: list[Candidate], starts: int
 
 def follow(problem: Problem, iterate: Iterate) -> Iterate:
     """The gait at the final delta, with every interval halved."""
-    space = space_of(problem, halved(iterate.space.mesh.edges))
+    space = space_of(problem, halve(iterate.space.mesh.edges))
     v = space.parameters(iterate.gait)
     return descend(optimise(space, v, iterate.delta, MEDIUM))
 

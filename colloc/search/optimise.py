@@ -89,7 +89,7 @@ def optimise(
     while True:
         program = ReducedProgram(space, delta)
         if np.isnan(program.objective(start)):  # as where few points see a coasting body slip
-            space = space_of(problem, halved(space.mesh.edges), space.scheme, space.far)
+            space = space_of(problem, halve(space.mesh.edges), space.scheme, space.far)
             program = ReducedProgram(space, delta)
         if np.isnan(program.objective(start)):
             lack = program.motion.kind.lack
@@ -109,7 +109,7 @@ def optimise(
     )
 
 
-def halved(edges: np.ndarray) -> np.ndarray:
+def halve(edges: np.ndarray) -> np.ndarray:
     return np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
 
 
@@ -295,8 +295,8 @@ def on_more_panels(iterate: Iterate) -> tuple[SearchSpace, np.ndarray] | None:
         return None
 
     def on(count):
-        stated = problem.with_(body=on_panels(problem.body, count))
-        space = space_of(stated, old.edges, old.scheme, old.far)
+        richer = problem.with_(body=on_panels(problem.body, count))
+        space = space_of(richer, old.edges, old.scheme, old.far)
         v = space.parameters(iterate.gait)
         return (space, v), ReducedProgram(space, iterate.delta).objective(v)
 

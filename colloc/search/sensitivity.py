@@ -230,13 +230,13 @@ def _again(solution: Solution, problem: Problem, change: float) -> Again:
         quantities=problem.integrals,
         turn=turn,
     )
-    breaks, turned = [], on_file.rotation - turn
+    breaks, rotation = [], on_file.rotation - turn
     excess = ReducedProgram(space, delta).place_rows(v)
     if excess > 1e-5:  # [rad], or relative
         breaks.append(f"{excess:.2g} beyond its limits")
     closing = problem.regime.closing_symmetry(problem.gait.symmetry)
-    if problem.rotation is not None and closing == NONE and abs(turned) > 1e-4:
-        breaks.append(f"turns {np.degrees(turned):+.2g}° too far per cycle")
+    if problem.rotation is not None and closing == NONE and abs(rotation) > 1e-4:
+        breaks.append(f"turns {np.degrees(rotation):+.2g}° too far per cycle")
     for aim, least in problem.at_least:
         if aim(on_file.values) < least * (1 - 1e-5):
             breaks.append(f"{aim.name} {aim(on_file.values):.4g}, not {least:.4g}")

@@ -38,7 +38,7 @@ from colloc.results.archive import (
     save_archive,
 )
 from colloc.results.solution import SOLVED, Solution
-from colloc.results.store import Saved, save_result
+from colloc.results.store import SavedFile, save_result
 from colloc.search.certify import is_trivial
 from colloc.search.checkpoint import Progress
 from colloc.search.explore import with_reachable_distance
@@ -48,7 +48,7 @@ from colloc.search.solve import solve as search_solve
 from colloc.system.arguments import check_choice, check_count, shown
 from colloc.system.errors import NotConvergedError, ProblemError
 from colloc.system.files import run_file
-from colloc.system.task_pool import Lost, Task, pool_for, process_pool, run_tasks
+from colloc.system.task_pool import LostTask, Task, pool_for, process_pool, run_tasks
 
 Stated = Problem | str | os.PathLike[str]
 _FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
@@ -150,7 +150,7 @@ def resume(
     return solution
 
 
-def save_and_clear(solution: Solution, path: Path) -> list[Saved]:
+def save_and_clear(solution: Solution, path: Path) -> list[SavedFile]:
     """Save a solution, and remove the checkpoint unless it was interrupted."""
     saved = save_result(solution, path)
     if not solution.interrupted:
@@ -314,7 +314,7 @@ def run_starts(
     tasks = (Task(k, (problem, sampler, seed, k, time_limit)) for k in starts)
     ready = partial(next, tasks, None)
     for task, outcome in run_tasks(_run_start, ready, workers=workers, executor=executor):
-        if isinstance(outcome, Lost):
+        if isinstance(outcome, LostTask):
             guess, number = problem.guess, task.arguments[3]
             outcome = Outcome(number, CRASHED, outcome.message, guess, guess)
         archive.add({StartName(sampler, seed, outcome.start): outcome})

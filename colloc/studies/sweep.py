@@ -64,7 +64,7 @@ from colloc.system.arguments import check_count
 from colloc.system.errors import CollocError, ProblemError
 from colloc.system.row_file import put_rows, read_rows
 from colloc.system.store_file import Table, save_table
-from colloc.system.task_pool import Lost, Task, pool_for, process_pool, run_tasks
+from colloc.system.task_pool import LostTask, Task, pool_for, process_pool, run_tasks
 from colloc.verification.replay import replayer
 
 JOURNAL, NAME = "colloc journal 2", "journal.sqlite"
@@ -181,8 +181,8 @@ def value_of(problem: Problem, gait: AnyGait, instants: tuple[int, int] = _COARS
         )  # fmt: skip
     except CollocError:
         return 0.0
-    turned = 0.0 if problem.rotation is None else abs(period.rotation - rotation)
-    sure = {**period.values, "distance": max(0.0, period.distance - _LEVER * turned)}
+    excess = 0.0 if problem.rotation is None else abs(period.rotation - rotation)
+    sure = {**period.values, "distance": max(0.0, period.distance - _LEVER * excess)}
     value = problem.objective(sure)
     return float(value) if np.isfinite(value) else 0.0
 
@@ -386,7 +386,7 @@ class StudyRun:
                 run_chunk, tasks, workers=workers, executor=executor, ahead=ahead
             ):
                 (works,) = task.arguments
-                if isinstance(result, Lost):
+                if isinstance(result, LostTask):
                     result = [failed_visit(work, CRASHED, result.message) for work in works]
                 append_visits(self.folder, [v for v in result if v.attempts or v.scores])
                 for work, visited in zip(works, result, strict=True):

@@ -41,7 +41,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Lost:
+class LostTask:
     """Stands for a result that the executor failed twice to give."""
 
     message: str
@@ -134,7 +134,7 @@ def run_tasks(
 
     `ready` returns the next task, or None if there is none now; it is called again after each
     result, and the run ends when nothing is under way. `ahead` tasks wait for a worker. A task that
-    raises, or loses its worker, is repeated alone; if that fails too its result is `Lost`.
+    raises, or loses its worker, is repeated alone; if that fails too its result is `LostTask`.
     BrokenExecutor is raised if not even a first task can be submitted.
     """
     suspects: list[Task] = []  # under way when a worker died
@@ -175,7 +175,7 @@ def run_tasks(
                             yield task, future.result()
                         elif alone:
                             why = f"{type(error).__name__}: {error}"
-                            yield task, Lost(f"its worker failed twice ({why}).")
+                            yield task, LostTask(f"its worker failed twice ({why}).")
                         else:
                             suspects.append(task)
             except BrokenExecutor:
@@ -185,7 +185,8 @@ def run_tasks(
                 if not alone:
                     suspects += pending.values()
                 for task in pending.values() if alone else ():
-                    yield task, Lost("its worker process died twice (killed, or out of memory).")
+                    lost = LostTask("its worker process died twice (killed, or out of memory).")
+                    yield task, lost
             except BaseException:
                 listened = False
                 raise

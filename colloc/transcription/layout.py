@@ -127,8 +127,8 @@ def balanced_variables(
     rotation, velocity = RADIANS * z[OMEGA] - turn, RADIANS * speed * np.array(now.centre)
     pose = CollocatedPose.on_mesh(mesh, rotation, velocity, kind.initial_heading(begin))
     power = (weight * (speed * now.power)[points]).sum(axis=1)
-    way, turned = complex(pose.place[-1]), float(pose.rotations.sum())
-    along_totals = kind.total_gradients(PeriodTotals(way, turned, float(power.sum()), begin))
+    way, rotation = complex(pose.place[-1]), float(pose.rotations.sum())
+    along_totals = kind.total_gradients(PeriodTotals(way, rotation, float(power.sum()), begin))
     heading = float(np.angle(along_totals["distance"].side))
     climbed = (pose.place * np.conj(along_totals["work"].side)).real
     # where the orientation is no state the plane is turned so that the gait goes along +x

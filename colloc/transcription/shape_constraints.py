@@ -229,7 +229,7 @@ def near_peaks(
     return which, cells, peaks(at_times, left, 2 * h / SAMPLES, 2)[0]
 
 
-class Placed(NamedTuple):
+class CheckTimes(NamedTuple):
     """Checks at instants, in each of some mesh cells, with the shares that are held there, ``(n,)``
     each."""
 
@@ -293,7 +293,7 @@ class ShapeLimits:
         checks = shape_checks(body, far, speeds, control.dynamics.joint_map)
         which, cells, times = near_peaks(gaits, table, mesh, checks, self._limit, 0.0)
         shares = checks.shares(which, checks.shapes(gaits, table, which, times))
-        self._placed = placed = Placed(checks, which, cells, times, shares)
+        self._placed = placed = CheckTimes(checks, which, cells, times, shares)
         self._gaits, self._p = gaits, layout.parameters[:, 0]
         self._first, self.n_bend = layout.n, 0
         self._bends = dict[str, np.ndarray]()

@@ -115,8 +115,8 @@ class _Integrals:
             each = np.column_stack([left, middle]).ravel(), np.column_stack([middle, right]).ravel()
             parts = self._panel_sums(*each)
             both = parts[:, ::2] + parts[:, 1::2]
-            changed = np.abs(both - whole).max(axis=0, initial=0.0)
-            off = changed > error * np.maximum(right - left, _KINK)
+            change = np.abs(both - whole).max(axis=0, initial=0.0)
+            off = change > error * np.maximum(right - left, _KINK)
             off &= right - left > 2 * _NARROWEST
             lefts.append(left[~off])
             sums.append(both[:, ~off])
@@ -353,10 +353,10 @@ class GaitOnSlope(_Gait):
                     f"(residual {solved.residual[0]:.1e}): friction may be too weak to hold the "
                     f"body in that direction, so that it slides down; try a gentler slope."
                 )
-            moved = np.exp(1j * state[0]) * complex(*now.centre[:, 0])
+            velocity = np.exp(1j * state[0]) * complex(*now.centre[:, 0])
             works = now.power[0], now.actuator_power[0]
             (omega,), (steering,) = now.z[2], by_theta[2]
-            return np.array([omega, moved.real, moved.imag, *works, steering]), solved.z
+            return np.array([omega, velocity.real, velocity.imag, *works, steering]), solved.z
 
         start = np.append(begin, np.zeros(6 - np.size(begin)))
         return integrate_period(rates, start, tolerance * _UNITS, self.breaks, longest)
@@ -488,8 +488,8 @@ def slope_motion(
     *ways, steering = np.diff(ends[1:])
     error = float(np.abs(states[:5, -1] - loose[:5, -1]).max())
     several: Any = on.several(phases, states[0]), phases, states
-    seen = float(grade), course, ends[0] + course, *ways, np.exp(steering), error
-    return SlopeMotion(*seen, *several)
+    numbers = float(grade), course, ends[0] + course, *ways, np.exp(steering), error
+    return SlopeMotion(*numbers, *several)
 
 
 class RoughPeriod(NamedTuple):
@@ -561,9 +561,9 @@ class GaitWithInertia(_Gait):
         now, out = self._momenta_of(len(states))(*at), np.empty_like(states)
         if self.regime.slides:
             now[:, -3:-1] += self._pull(states).T
-        moved = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
+        velocity = np.exp(1j * states[:, _THETA]) * (now[:, 3] + 1j * now[:, 4])
         out[:, _MOMENTA], out[:, _THETA] = now[:, 6:], now[:, 2] - self.turn
-        out[:, 4], out[:, 5], out[:, _WORK] = moved.real, moved.imag, now[:, 5]
+        out[:, 4], out[:, 5], out[:, _WORK] = velocity.real, velocity.imag, now[:, 5]
         return out.ravel()
 
     def jacobian(self, t: float, states: np.ndarray) -> np.ndarray:
@@ -573,11 +573,11 @@ class GaitWithInertia(_Gait):
         at = self.body, self.friction, (*shapes, self.delta), states[:, _MOMENTA].T, self.froude
         now, slopes = momenta_at(*at, along_states=True)
         axis, each = np.exp(1j * states[:, _THETA]), np.arange(n)
-        moved, moving = axis * (now[3] + 1j * now[4]), axis * (slopes[3] + 1j * slopes[4])
+        velocity, slope = axis * (now[3] + 1j * now[4]), axis * (slopes[3] + 1j * slopes[4])
         by_state = np.zeros((7, 7, n))
         by_state[_MOMENTA, _MOMENTA], by_state[_THETA, _MOMENTA] = slopes[6:], slopes[2]
-        by_state[4, _MOMENTA], by_state[5, _MOMENTA] = moving.real, moving.imag
-        by_state[4, _THETA], by_state[5, _THETA] = -moved.imag, moved.real
+        by_state[4, _MOMENTA], by_state[5, _MOMENTA] = slope.real, slope.imag
+        by_state[4, _THETA], by_state[5, _THETA] = -velocity.imag, velocity.real
         by_state[_WORK, _MOMENTA] = slopes[5]
         if self.regime.slides:  # the pull turns against the body
             pull = self._pull(states)
@@ -677,8 +677,8 @@ class GaitWithInertia(_Gait):
         by a gap."""
         off = np.column_stack([np.diag(steps), amplification(slopes) * (steps[_MOMENTA] + gap)])
         (start, end), totals = ends.T, self.totals(ends)
-        changed = [self.totals(np.column_stack([start, end + each])) for each in off.T]
-        return {x: sum(abs(other[x] - value) for other in changed) for x, value in totals.items()}
+        others = [self.totals(np.column_stack([start, end + each])) for each in off.T]
+        return {x: sum(abs(other[x] - value) for other in others) for x, value in totals.items()}
 
     def replay(
         self, objective: Objective, tolerance: float, extra: Any, limits: PathLimits,

@@ -292,7 +292,7 @@ def _errors_with_states(reference: Reference, mesh: Mesh) -> dict[str, Any]:
     cycle, period = _period(control, *totals)
     weights, rotation = objective.shares(period), pose.rotations - theta
     displacement = np.diff(pose.place) - (x + 1j * y)
-    turned = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
+    turning = abs(float(rotation.sum())) * 0.5 / max(abs(period["distance"]), 1e-300)
     by_states: Any = 0.0
     if exact.solve_intervals is not None:
         states = at_edges[: len(kind.states)]
@@ -315,7 +315,7 @@ def _errors_with_states(reference: Reference, mesh: Mesh) -> dict[str, Any]:
         "value": value if along.exist.all() else np.nan * value,
         "total": float(objective(on_mesh) / objective(period) - 1),
         "unresolved": float(exact.error * sum(map(abs, weights.values()))),
-        "turning": turned if control.admissible.gait.symmetry == NONE else 0.0,
+        "turning": turning if control.admissible.gait.symmetry == NONE else 0.0,
     }
 
 
@@ -500,17 +500,17 @@ def _split(
     while shares.sum() > tolerance and left.size * (rule.s - rule.left) < budget:
         # half of those that hold the excess at a time: what they leave behind is not known yet
         order, count = _by_error(shares, tolerance)
-        chosen = order[: max(1, count // 2)]
-        chosen = chosen[right[chosen] - left[chosen] > 2 * _NARROWEST]
-        if chosen.size == 0:
+        cut = order[: max(1, count // 2)]
+        cut = cut[right[cut] - left[cut] > 2 * _NARROWEST]
+        if cut.size == 0:
             break
-        a, b = left[chosen], right[chosen]
+        a, b = left[cut], right[cut]
         at_a, at_b = np.isin(a, kinks), np.isin(b, kinks)
         middle = a + np.where(at_a & ~at_b, GRADE, np.where(at_b & ~at_a, 1 - GRADE, 0.5)) * (b - a)
         new_left, new_right = np.concatenate([a, middle]), np.concatenate([middle, b])
         new = interval_shares(reference, rule, new_left, new_right)
         left, right, shares = (
-            np.concatenate([np.delete(old, chosen), added])
+            np.concatenate([np.delete(old, cut), added])
             for old, added in ((left, new_left), (right, new_right), (shares, new))
         )
     return np.sort(np.append(left, right.max())), float(shares.sum() + unresolved)
@@ -527,6 +527,6 @@ def _halve(
         if small or full or np.isnan(shares).any():
             return edges, error.estimate
         order, count = _by_error(shares, tolerance)
-        chosen = order[: max(1, count)]
-        chosen = chosen[shares[chosen] > _WORST * shares.max()]
-        edges = np.sort(np.concatenate([edges, 0.5 * (edges[chosen] + edges[chosen + 1])]))
+        cut = order[: max(1, count)]
+        cut = cut[shares[cut] > _WORST * shares.max()]
+        edges = np.sort(np.concatenate([edges, 0.5 * (edges[cut] + edges[cut + 1])]))

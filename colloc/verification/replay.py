@@ -72,16 +72,16 @@ class Panels(NamedTuple):
     wider: np.ndarray  # `changes` of the panel that each is half of, (n, 3 + k)
     differences: np.ndarray  # of `_find_differences`, NaN where there are none yet, as the rates
 
-    def take(self, chosen: np.ndarray) -> Panels:
-        return Panels(*(a[chosen] for a in self))
+    def take(self, index: np.ndarray) -> Panels:
+        return Panels(*(a[index] for a in self))
 
     def join(self, other: Panels) -> Panels:
         both = Panels(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
         return both.take(np.argsort(both.left))
 
-    def halves(self, between: tuple[np.ndarray, ...], changed: np.ndarray) -> Panels:
+    def halves(self, between: tuple[np.ndarray, ...], changes: np.ndarray) -> Panels:
         """Both halves of each, from values (z, rates, joint_power, apart) between the instants
-        ``(n, 4)``, and what halving changed."""
+        ``(n, 4)``, and `changes`."""
         fields = []
         for old, new in zip(self[2:6], between, strict=True):
             merged = np.empty((len(old), 9, *old.shape[2:]), dtype=old.dtype)
@@ -90,7 +90,7 @@ class Panels(NamedTuple):
             fields.append(both.reshape(2 * len(old), *old.shape[1:]))
         left, width = np.repeat(self.left, 2), 0.5 * np.repeat(self.width, 2)
         left[1::2] += width[1::2]
-        wider, unknown = np.repeat(changed, 2, axis=0), np.full_like(fields[1], np.nan)
+        wider, unknown = np.repeat(changes, 2, axis=0), np.full_like(fields[1], np.nan)
         return Panels(left, width, *[*fields, wider, unknown])
 
 
@@ -99,8 +99,8 @@ def first_panels(left: np.ndarray, width: np.ndarray, values: tuple[np.ndarray, 
     paired = [np.concatenate([a[::2, ::2], a[1::2, 2::2]], axis=1) for a in values]
     unknown = np.full_like(values[1], np.nan)
     pairs = Panels(left[::2], 2 * width[::2], *[*paired, np.empty(0), unknown[::2]])
-    changed = changes(pairs, *poses(*increments(pairs)[:2]))[0]
-    return Panels(left, width, *[*values, np.repeat(changed, 2, axis=0), unknown])
+    wider = changes(pairs, *poses(*increments(pairs)[:2]))[0]
+    return Panels(left, width, *[*values, np.repeat(wider, 2, axis=0), unknown])
 
 
 def increments(panels: Panels, rule: np.ndarray = WHOLE) -> tuple[np.ndarray, ...]:
@@ -126,11 +126,11 @@ def changes(
     + k)``, and the largest if the panel lay up to one, and up to two instants beside; magnitudes,
     from the `poses`."""
     _find_differences(panels)
-    turned, moved, *others = panels.differences.transpose(2, 1, 0)
+    spin, move, *others = panels.differences.transpose(2, 1, 0)
     # what comes after the panel turns with it
-    end = place[-1] - np.exp(1j * heading[:-1]) * moved - 1j * turned * (place[-1] - place[1:])
+    end = place[-1] - np.exp(1j * heading[:-1]) * move - 1j * spin * (place[-1] - place[1:])
     shorter = abs(place[-1]) - np.abs(end)
-    sizes = np.abs(np.stack([turned.real, shorter, *(each.real for each in others)], axis=2))
+    sizes = np.abs(np.stack([spin.real, shorter, *(each.real for each in others)], axis=2))
     return sizes[_BESIDE], sizes[1:-1].max(axis=0), sizes.max(axis=0)
 
 
@@ -156,7 +156,7 @@ def _find_differences(panels: Panels) -> None:
     panels.differences[some] = np.transpose(each, (2, 1, 0))
 
 
-def _beside(panels: Panels, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _beside(panels: Panels, some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Indices among all instants of the two before and after some panels, at their spacing ``(n,
     4)``; and whether there are such, with no corner between."""
     left, width = panels.left[:, None], panels.width[:, None]
@@ -167,7 +167,7 @@ def _beside(panels: Panels, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     stretch = np.concatenate([[0], np.cumsum(corners[:-1])])
     if not corners[-1]:
         stretch[stretch == stretch[-1]] = 0
-    left, width, at = left[chosen], width[chosen], stretch[chosen, None]
+    left, width, at = left[some], width[some], stretch[some, None]
     places = left + 0.25 * width * np.array([*range(-_BESIDE, 0), *range(5, 5 + _BESIDE)])
     slack = _SLACK * width
     index = np.searchsorted(instants, places % 1.0 - slack) % instants.size
@@ -318,35 +318,35 @@ def replay(
     while True:
         spin, move, *sums = increments(panels)
         heading, place = poses(spin, move)
-        moved = heading[-1] + turn, max(chord * abs(place[-1]), 1e-300)
-        totals = (float(total) for total in (*moved, *(part.sum() for part in sums)))
+        way = heading[-1] + turn, max(chord * abs(place[-1]), 1e-300)
+        totals = (float(total) for total in (*way, *(part.sum() for part in sums)))
         values = dict(zip(names, totals, strict=True))
         if not values["work"] > 0:
             raise ProblemError(
                 "the path does not move, or too little to do work against friction: it has no "
                 "efficiency."
             )
-        changed, one_beside, two_beside = changes(panels, heading, place)
-        missed = remaining_error(one_beside, two_beside, panels.wider).T
-        missed[1] *= chord
-        errors = dict(zip(names, missed, strict=True))
+        of_halves, one_beside, two_beside = changes(panels, heading, place)
+        gaps = remaining_error(one_beside, two_beside, panels.wider).T
+        gaps[1] *= chord
+        errors = dict(zip(names, gaps, strict=True))
         gap = objective.relative_error(values, errors)
         # finer panels do not make up for what the balance leaves over
         left_over = tolerance - residual if residual < tolerance else np.inf
-        chosen = _largest(gap, panels.width, left_over)
-        if chosen.size == 0 or 4 * (panels.left.size + chosen.size) > most_instants:
+        halve = _largest(gap, panels.width, left_over)
+        if halve.size == 0 or 4 * (panels.left.size + halve.size) > most_instants:
             break
-        old = panels.take(chosen)
+        old = panels.take(halve)
         middles = old.left[:, None] + old.width[:, None] * (np.arange(4) + 0.5) / 4
         if law.associated:
             start = 0.5 * (old.z[:, :-1] + old.z[:, 1:])
         else:  # the branch on which the body is before
             start = old.z[:, :-1] if sense == FORWARDS else old.z[:, 1:]
-        halves = old.halves(state_at(middles, start.reshape(-1, 3).T), changed[chosen])
-        panels = panels.take(np.delete(np.arange(gap.size), chosen)).join(halves)
+        halves = old.halves(state_at(middles, start.reshape(-1, 3).T), of_halves[halve])
+        panels = panels.take(np.delete(np.arange(gap.size), halve)).join(halves)
     others, several = _other_motions(panels, place)
-    known = panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)
-    known[np.isin(panels.left, breaks), 0] += ONE_SIDED
+    phases = panels.left[:, None] + panels.width[:, None] * np.linspace(0.0, 0.75, 4)
+    phases[np.isin(panels.left, breaks), 0] += ONE_SIDED
     # what the balance leaves over counts in proportion to each
     sizes = {each.name: each.needs_forces * abs(values[each.name]) for each in integrands}
     sizes = values | {"rotation": 1.0} | sizes
@@ -354,13 +354,13 @@ def replay(
         values=values,
         errors={name: float(errors[name].sum() + residual * sizes[name]) for name in names},
         others=dict(zip(names, others, strict=True)),
-        lever=lever(body, path(known.ravel())[0]),
+        lever=lever(body, path(phases.ravel())[0]),
         actuator_work=float(((panels.joint_power @ WHOLE[-1]) * panels.width).sum()),
         residual=residual,
         error=float(gap.sum()) + residual,
         several=several,
         instants=4 * panels.left.size,
-        tail=(known.ravel(), panels.z[:, :4].reshape(-1, 3).T),
+        tail=(phases.ravel(), panels.z[:, :4].reshape(-1, 3).T),
         shares=shares,
         objective=objective,
     )

@@ -9,7 +9,7 @@ import pytest
 import colloc
 from colloc import Chain, Coupled, Foot, Fourier, Friction, Harmonic, Problem, Robot, Wheel
 from colloc.commands.main import main
-from colloc.search.evaluate import Identified, _Fit
+from colloc.search.evaluate import Identification, _Fit
 
 GAIT = colloc.ellipse(A0=0.3, A1=1.6, B1=1.1)
 WAVE = Fourier([0.0, 0.0, 0.0], [[0.6], [0.3], [-0.3]], [[0.0], [0.5], [0.5]])
@@ -290,7 +290,7 @@ def test_a_record_without_a_path_is_refused(tmp_path):
 def test_the_line_for_a_problem_file_states_feet_and_their_weights_if_they_differ(weights):
     feet = tuple(Wheel(k, rolling=0.1, weight=each) for k, each in enumerate(weights))
     body = Chain(feet=feet)
-    found = Identified(Problem("wheels", body=body), {}, 0.0, 0.0, (), "")
+    found = Identification(Problem("wheels", body=body), {}, 0.0, 0.0, (), "")
     stated = eval(found.line.removeprefix("feet="), {"Foot": Foot, "Friction": Friction})
     assert Chain(feet=stated).feet == body.feet
     assert ("weight" in found.line) == (weights[0] is not None)

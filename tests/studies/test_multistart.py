@@ -27,7 +27,7 @@ from colloc.search.certify import is_trivial
 from colloc.search.options import Tolerances
 from colloc.search.solve import solve
 from colloc.studies import solve as campaign
-from colloc.system.task_pool import Lost
+from colloc.system.task_pool import LostTask
 from colloc.verification.replay import replay
 from tests.shared.stages import answer_near
 
@@ -222,7 +222,7 @@ def test_a_bad_start_or_a_slow_one_does_not_end_the_run(monkeypatch):
 def test_a_worker_that_dies_costs_one_start(monkeypatch):
     def run_tasks(function, ready, **_):
         while (task := ready()) is not None:
-            yield task, Lost("its worker died") if task.key == 2 else outcome(task.key)
+            yield task, LostTask("its worker died") if task.key == 2 else outcome(task.key)
 
     monkeypatch.setattr(campaign, "run_tasks", run_tasks)
     found = list(campaign.run_starts(Archive(problem()), range(6)))

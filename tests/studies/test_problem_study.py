@@ -35,7 +35,7 @@ from colloc.studies.sweep import (
     start_key,
     study_table,
 )
-from colloc.system.task_pool import Lost
+from colloc.system.task_pool import LostTask
 from colloc.verification.replay import replay
 
 FILE = """
@@ -359,7 +359,7 @@ def test_a_task_whose_worker_dies_is_recorded_as_crashed(fake, tmp_path, monkeyp
     def run_tasks(function, ready, **_):
         while (task := ready()) is not None:
             first = task.arguments[0][0].cell == (0, 1) and not task.arguments[0][0].tried
-            yield task, Lost("its worker died") if first else function(*task.arguments)
+            yield task, LostTask("its worker died") if first else function(*task.arguments)
 
     monkeypatch.setattr(study_run, "run_tasks", run_tasks)
     run = StudyRun(grid(), tmp_path)

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from colloc.system.task_pool import Lost, Task, pool_for, process_pool, run_tasks
+from colloc.system.task_pool import LostTask, Task, pool_for, process_pool, run_tasks
 
 UNGUARDED = {
     "colloc's": "import colloc\nfrom operator import neg as task",
@@ -52,7 +52,7 @@ def test_a_worker_killed_mid_run_loses_nothing_and_one_that_always_dies_is_named
     ran = run_tasks(dying_once, listed(tasks), workers=2, ahead=2)
     found = {task.key: result for task, result in ran}
     assert {x: r for x, r in found.items() if x != 5} == {x: 2 * x for x in range(9) if x != 5}
-    assert isinstance(found[5], Lost)
+    assert isinstance(found[5], LostTask)
     assert "died twice" in found[5].message
 
 
@@ -118,7 +118,7 @@ def test_what_a_cluster_gives_up_on_is_tried_again_alone_and_then_named():
     ran = run_tasks(doubled, tasks, workers=2, executor=Unreliable)
     found = {task.key: result for task, result in ran}
     assert found[2] == 4
-    assert found[4] == Lost("its worker failed twice (ConnectionError: worker gone).")
+    assert found[4] == LostTask("its worker failed twice (ConnectionError: worker gone).")
     assert sorted(found) == list(range(6))
 
 
